@@ -48,6 +48,20 @@ class Alarm:
     words: str
 
 
+class RefusedError(Exception):
+    """A device answered that it does not execute a command, or that it has an error.
+
+    Parameters
+    ----------
+    code, words : str
+        The device's own code, and what it said.
+    """
+
+    def __init__(self, code: str, words: str) -> None:
+        super().__init__(words)
+        self.code, self.words = code, words
+
+
 class MoveCheck(Protocol):
     """Limits of an actuator as stated in its configuration: sufficient to check a plan without opening the test bed.
 

@@ -10,23 +10,28 @@ hardware. The library's own mock connection cannot be used, because it does not 
 from collections.abc import Callable
 from typing import Any
 
-from fingervision.domain.errors import DeviceError
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.actuator import Alarm, StageLimits
-from fingervision.testbed.actuators._library_axis import LibraryAxis, in_a_line, without_hardware
+from fingervision.testbed.actuator import RefusedError
+from fingervision.testbed.actuators._single_axis import KEYS as AXIS
+from fingervision.testbed.actuators._single_axis import (
+    AxisSettings,
+    SingleAxis,
+    T,
+    in_a_line,
+    stated_axis,
+    without_hardware,
+)
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion.stated_limits import KEYS as LIMITS
-from fingervision.testbed.motion.stated_limits import stated_limits
 
 __all__ = ["KEYS", "SIMULATED", "ZaberStage", "build", "without_hardware"]
-KEYS = ("port", "device", "axis", "microstep_mm", *LIMITS)
+KEYS = ("port", "device", "axis", "microstep_mm", *AXIS)
 SIMULATED = False
 SPEED_UNIT = 1.6384
 """Value of one microstep per second in native speed units (Zaber, "ASCII Protocol Manual", maxspeed)."""
 
 
-class ZaberStage(LibraryAxis):
+class ZaberStage(SingleAxis):
     """One axis of a Zaber device.
 
     Parameters
@@ -39,8 +44,8 @@ class ZaberStage(LibraryAxis):
         Distance of one microstep.
     clock : Clock
         Clock of the test bed.
-    limits : StageLimits
-        Limits of the stage.
+    settings : AxisSettings
+        Limits and coordinate of the stage.
 
     Raises
     ------
@@ -48,9 +53,9 @@ class ZaberStage(LibraryAxis):
         The device does not answer.
     """
 
-    def __init__(self, connection: Any, axis: Any, microstep_mm: float, clock: Clock, limits: StageLimits) -> None:
+    def __init__(self, connection: Any, axis: Any, microstep_mm: float, clock: Clock, settings: AxisSettings) -> None:
         name = f"Zaber device {axis.device.device_address}, axis {axis.axis_number}"
-        super().__init__(name, "a Zaber stage", clock, limits)
+        super().__init__(name, clock, settings)
         self._connection, self._axis, self._microstep_mm = connection, axis, microstep_mm
         # The device stores its highest speed permanently: the previous value is restored at the end.
         self._speed_before = self._asked(lambda: axis.settings.get("maxspeed"))
@@ -78,21 +83,17 @@ class ZaberStage(LibraryAxis):
         finally:
             self._connection.close()
 
-    def _do(self, act: Callable[[], None]) -> None:
+    def _asked(self, act: Callable[[], T]) -> T:
         from zaber_motion.exceptions import CommandFailedException
 
-        try:
-            with self._line:
-                act()
-        except CommandFailedException as error:
-            words = str(getattr(error.details, "response_data", error))
-            self._alarm = Alarm(words, f"the device answered {words}")
-            raise DeviceError(
-                f"{self.name} must accept the command, but refused it ({words}): home the stage first."
-            ) from error
-        except Exception as error:
-            raise self._silent(error) from error
-        self._alarm = None
+        def asked() -> T:
+            try:
+                return act()
+            except CommandFailedException as error:
+                code = str(getattr(error.details, "response_data", error))
+                raise RefusedError(code, f"the device answered {code}") from error
+
+        return super()._asked(asked)
 
 
 def build(section: Section, context: BuildContext) -> ZaberStage:
@@ -103,7 +104,7 @@ def build(section: Section, context: BuildContext) -> ZaberStage:
         section.refuse(
             "kind", f"needs zaber-motion, which is not installed ({error}): pip install 'fingervision[zaber]'."
         )
-    limits, port = stated_limits(section), section.word("port")
+    settings, port = stated_axis(section), section.word("port")
     device, axis = section.whole("device", 1, low=1, high=99), section.whole("axis", 1, low=1, high=9)
     microstep_mm = section.number("microstep_mm", above=0.0)
     try:
@@ -114,4 +115,5 @@ def build(section: Section, context: BuildContext) -> ZaberStage:
     except Exception as error:
         words = f"must be that of a Zaber device, but {port} could not be opened ({in_a_line(error)})."
         section.refuse("port", words)
-    return ZaberStage(connection, connection.get_device(device).get_axis(axis), microstep_mm, context.clock, limits)
+    its = connection.get_device(device).get_axis(axis)
+    return ZaberStage(connection, its, microstep_mm, context.clock, settings).at_rest()

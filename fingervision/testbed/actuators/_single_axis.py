@@ -1,0 +1,288 @@
+"""One axis behind a driver of seven calls: limits, watchdog, lost steps, refusals and silence are handled here, once.
+
+A kind of stage is a subclass that translates seven calls into its own protocol. What every stage must do (refuse a
+target beyond the limits, refuse a second motion, stop at any time, end a motion that never arrives, notice that it
+rests at another place than it was sent to) stands in this file, so that no kind can forget it.
+"""
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from math import inf, isfinite
+from pathlib import Path
+from typing import Self, TypeVar
+
+from fingervision.domain.errors import DeviceError, FingervisionError, LimitError, StateError
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.actuator import Alarm, RefusedError, StageLimits
+from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.motion import stated_limits
+from fingervision.testbed.motion.move_limits import FreeMoves, check_move, check_speed
+from fingervision.testbed.reading import Reading
+
+T = TypeVar("T")
+KEYS = (*stated_limits.KEYS, "zero_mm", "reversed")
+# A motion counts as stuck after PATIENCE times its duration plus PATIENCE_S; homing, of unknown length, after HOME_S.
+PATIENCE, PATIENCE_S, HOME_S = 1.5, 2.0, 120.0
+# A stepper loses steps by whole electrical cycles of four full steps: 20 um for 200 steps per turn and a lead of 1 mm.
+LOST_MM = 0.02
+HOMING_MM_S = 1.0
+LOOK_EVERY_S = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class AxisSettings:
+    """What a configuration states about a stage.
+
+    Parameters
+    ----------
+    limits : StageLimits
+        Limits of the stage, in the test bed's coordinate.
+    zero_mm : float
+        Position of the device at the test bed's position 0.
+    sign : float
+        -1 if the device counts against the test bed's direction (positive positions open the gripper), else 1.
+    """
+
+    limits: StageLimits
+    zero_mm: float = 0.0
+    sign: float = 1.0
+
+
+def stated_axis(section: Section) -> AxisSettings:
+    """Read the settings listed in `KEYS`."""
+    limits = stated_limits.stated_limits(section)
+    return AxisSettings(limits, section.number("zero_mm", 0.0), -1.0 if section.flag("reversed") else 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """A commanded motion: its target (None while homing) and the time at which it must have ended."""
+
+    to_mm: float | None
+    until_s: float
+
+
+class SingleAxis(ABC):
+    """An actuator (`testbed.actuator`) without step data; the seven calls may raise any exception.
+
+    Parameters
+    ----------
+    name : str
+        Name of the actuator in run.json and in errors.
+    clock : Clock
+        Clock of the test bed.
+    settings : AxisSettings
+        Limits and coordinate of the stage.
+    """
+
+    has_steps = False
+
+    def __init__(self, name: str, clock: Clock, settings: AxisSettings) -> None:
+        self.name, self.limits = name, settings.limits
+        self._clock, self._settings = clock, settings
+        self._line = threading.RLock()  # keeps each question together with its answer
+        self._refusal: Alarm | None = None
+        self._lost: Alarm | None = None
+        self._motion: _Motion | None = None
+        self._stops = 0
+        self._closed = False
+
+    # Seven calls of a driver; positions are those of the device (mm).
+
+    @abstractmethod
+    def _moving(self) -> bool:
+        """Query the device whether a motion is in progress."""
+
+    @abstractmethod
+    def _position_mm(self) -> float:
+        """Query the device for its position."""
+
+    @abstractmethod
+    def _go_home(self) -> None:
+        """Begin to search the reference; do nothing if the device has none: then it only moves to its zero."""
+
+    @abstractmethod
+    def _begin(self, to_mm: float, speed_mm_s: float) -> None:
+        """Begin to move to a position; raise `RefusedError` if the device does not accept the command."""
+
+    @abstractmethod
+    def _halt(self) -> None:
+        """Stop the motion; called from any thread and during any other call, so that it must not wait for them."""
+
+    @abstractmethod
+    def _release(self) -> None:
+        """Close the connection."""
+
+    def at_rest(self) -> Self:
+        """Return the stage after ending a motion that an earlier program, which was killed, has left behind."""
+        if self.busy:
+            self.stop()
+            until_s = self._clock.now_s() + PATIENCE_S + self.limits.settling_s
+            while self.busy:
+                if self._clock.now_s() > until_s:
+                    raise DeviceError(f"{self.name} must come to rest when it is opened, but still moves: stop it.")
+                self._clock.wait_until(self._clock.now_s() + LOOK_EVERY_S)
+        return self
+
+    # The protocol of an actuator.
+
+    @property
+    def busy(self) -> bool:
+        """Whether the actuator moves."""
+        with self._line:
+            moving, motion = bool(self._asked(self._moving)), self._motion
+            if motion is None:
+                return moving
+            if moving:
+                if self._clock.now_s() > motion.until_s:
+                    self.stop()
+                    raise DeviceError(
+                        f"{self.name} must end its motion in time, but still moves: it was stopped; check that "
+                        "nothing blocks it, and that speed_mm_s and settling_s are those of the stage."
+                    )
+                return True
+            self._motion = None
+            return self._continues_home() if motion.to_mm is None else self._rests(motion.to_mm)
+
+    def _continues_home(self) -> bool:
+        """Move from the reference to position 0, if they are not the same; return whether the stage moves on."""
+        if abs(self._at_mm()) <= self._near_mm:
+            return False
+        self._start(0.0, min(HOMING_MM_S, self.limits.speed_mm_s))
+        return True
+
+    def _rests(self, to_mm: float) -> bool:
+        """Compare the position at rest with the target; return that the stage does not move."""
+        at_mm = self._at_mm()
+        if abs(at_mm - to_mm) > self._near_mm + LOST_MM:
+            words = f"it was sent to {to_mm:g} mm and rests at {at_mm:g} mm: steps were lost, or it was stopped by hand"
+            self._lost = Alarm("lost", f"{words}; home the stage")
+        return False
+
+    @property
+    def _near_mm(self) -> float:
+        limits = self.limits
+        return limits.accuracy_mm + 0.5 * limits.encoder_step_mm + limits.repeatability_mm + 1e-6
+
+    @property
+    def alarm(self) -> Alarm | None:
+        """Lost steps until the stage is homed, or the device's last refusal."""
+        return self._lost or self._refusal
+
+    def home(self) -> None:
+        """Go to the reference, then to position 0."""
+        self._ready()
+        stops, self._lost = self._stops, None
+        self._do(self._go_home)
+        self._went(stops, _Motion(None, self._clock.now_s() + HOME_S))
+
+    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        """Refuse motions beyond the limits of the stage."""
+        check_move(self.limits, to_mm, speed_mm_s)
+
+    def move(self, to_mm: float, speed_mm_s: float) -> None:
+        """Begin to move to a position at a positive speed."""
+        check_move(self.limits, to_mm, speed_mm_s)
+        self._ready()
+        if self._lost is not None:
+            raise DeviceError(f"{self.name} must know its position, but {self._lost.words}. Nothing was moved.")
+        self._start(to_mm, speed_mm_s)
+
+    def jog(self, speed_mm_s: float) -> None:
+        """Begin to move until stopped or until a limit is reached."""
+        check_speed(self.limits, abs(speed_mm_s))
+        if speed_mm_s != 0.0:
+            # The device's own continuous motion would ignore the limits in the test bed's configuration.
+            self.move(self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm, abs(speed_mm_s))
+
+    def run_step(self, number: int) -> None:
+        """Refuse: such a stage has no step data that a test bed could use."""
+        raise LimitError(f"Step {number} must be stored in the controller, but {self.name} has no step data: use move.")
+
+    def stop(self) -> None:
+        """Stop the motion at once, without waiting for a question that is being asked."""
+        self._stops += 1
+        self._motion = None
+        try:
+            self._halt()
+        except Exception as error:
+            raise DeviceError(
+                f"{self.name} must stop, but could not be told to ({in_a_line(error)}): it may still move; use the "
+                "emergency stop."
+            ) from error
+
+    def readings(self) -> tuple[Reading, ...]:
+        """The present position only, because the device does not store earlier positions."""
+        with self._line:
+            asked_s = self._clock.now_s()
+            position_mm = self._at_mm()
+            got_s = self._clock.now_s()
+            moving = self.busy
+        return (Reading(0.5 * (asked_s + got_s), asked_s, got_s, position_mm, moving),)
+
+    def close(self) -> None:
+        """Stop and close the connection; a connection that is lost already is closed without another error."""
+        if self._closed:
+            return
+        self._closed = True
+        with suppress(Exception):
+            self.stop()
+        with suppress(Exception), self._line:
+            self._release()
+
+    def _ready(self) -> None:
+        if self.busy:
+            raise StateError("The stage must be at rest before a new motion, but is still moving: stop it first.")
+
+    def _start(self, to_mm: float, speed_mm_s: float) -> None:
+        stops, settings = self._stops, self._settings
+        seconds = abs(to_mm - self._at_mm()) / speed_mm_s + self.limits.settling_s
+        self._do(lambda: self._begin(settings.zero_mm + settings.sign * to_mm, speed_mm_s))
+        self._went(stops, _Motion(to_mm, self._clock.now_s() + PATIENCE * seconds + PATIENCE_S))
+
+    def _went(self, stops: int, motion: _Motion) -> None:
+        """Note a motion that was begun; a stop that came while it was begun is repeated, because it came too early."""
+        self._motion = motion
+        if self._stops != stops:
+            self.stop()
+
+    def _at_mm(self) -> float:
+        position_mm = self._asked(self._position_mm)
+        if not isfinite(position_mm) or abs(position_mm) == inf:
+            raise DeviceError(f"{self.name} must answer with its position, but answered {position_mm}.")
+        return (position_mm - self._settings.zero_mm) * self._settings.sign
+
+    def _do(self, act: Callable[[], None]) -> None:
+        """Send a command; an accepted command ends an earlier refusal."""
+        self._asked(act)
+        self._refusal = None
+
+    def _asked(self, act: Callable[[], T]) -> T:
+        try:
+            with self._line:
+                return act()
+        except FingervisionError:
+            raise
+        except RefusedError as error:
+            self._refusal = Alarm(error.code, error.words)
+            raise DeviceError(
+                f"{self.name} must accept what it is told, but reported {error.words}: remove the cause, and home the "
+                "stage if its position is unknown."
+            ) from error
+        except Exception as error:  # serial ports, VISA and each library raise exceptions of their own classes
+            raise DeviceError(
+                f"{self.name} must answer a request, but did not ({in_a_line(error)}): check its cable."
+            ) from error
+
+
+def in_a_line(error: Exception) -> str:
+    """An exception's class and message, in one line without a full stop."""
+    return f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
+
+
+def without_hardware(section: Section, folder: Path) -> FreeMoves:
+    """Limits of the stage, for checking a plan without opening the test bed."""
+    return FreeMoves(stated_limits.stated_limits(section))

@@ -1,0 +1,238 @@
+"""A conversation in lines of text over a port: questions with their replies, refusals at any time, stops at once."""
+
+import re
+from collections.abc import Mapping
+from contextlib import suppress
+from time import monotonic, sleep
+from typing import Any, Protocol
+
+import serial
+
+from fingervision.domain.errors import DeviceError
+from fingervision.storage.toml_section import Section
+from fingervision.testbed.actuator import RefusedError
+from fingervision.testbed.text_protocol.words import Exchange, Words, filled
+
+KEYS = ("words", "port", "baud", "set")
+TRIES = 2
+"""A question is asked again once, because one line in a noisy cable may be spoilt; a command never is."""
+
+
+class Port(Protocol):
+    """A port that sends bytes and receives lines."""
+
+    def write(self, data: bytes) -> object:
+        """Send bytes; may be called from any thread, and while another thread waits for a line."""
+        ...
+
+    def line(self, end: bytes, within_s: float) -> bytes:
+        """Wait for a line, or return what came of it within the time; 0 s returns what is there already."""
+        ...
+
+    def close(self) -> None:
+        """Release the port."""
+        ...
+
+
+class SerialPort:
+    """A serial port by its name (`/dev/ttyUSB0`, `COM3`), or a pyserial address such as `socket://host:port`."""
+
+    def __init__(self, name: str, baud: int, options: Mapping[str, Any]) -> None:
+        self._port = serial.serial_for_url(name, baudrate=baud, timeout=0.0, write_timeout=1.0, **options)
+        self._rest = b""
+
+    def write(self, data: bytes) -> object:
+        """Send bytes."""
+        return self._port.write(data)
+
+    def line(self, end: bytes, within_s: float) -> bytes:
+        """Return the next line with its end, or an incomplete line when the time is over."""
+        until_s = monotonic() + within_s
+        while end not in self._rest:
+            self._port.timeout = max(0.0, min(0.05, until_s - monotonic()))
+            got = self._port.read(max(1, self._port.in_waiting))
+            self._rest += got
+            if not got and monotonic() >= until_s:
+                return b""
+        line, _, self._rest = self._rest.partition(end)
+        return line + end
+
+    def close(self) -> None:
+        """Release the port."""
+        self._port.close()
+
+
+class VisaPort:
+    """A VISA resource such as `GPIB0::1::INSTR` or `TCPIP::192.168.1.5::INSTR`; needs the extra `visa`."""
+
+    def __init__(self, name: str, baud: int | None) -> None:
+        import pyvisa
+
+        resource, _, backend = name.partition("@")
+        self._manager: Any = pyvisa.ResourceManager(f"@{backend}" if backend else "")
+        speed: dict[str, Any] = {} if baud is None else {"baud_rate": baud}
+        self._port: Any = self._manager.open_resource(resource, **speed)
+
+    def write(self, data: bytes) -> object:
+        """Send bytes."""
+        return self._port.write_raw(data)
+
+    def line(self, end: bytes, within_s: float) -> bytes:
+        """Return the next message; VISA has no way to look whether one is there, so that 0 s returns none."""
+        if within_s <= 0.0:
+            return b""
+        self._port.timeout = 1e3 * within_s
+        self._port.read_termination = end.decode("latin-1")
+        try:
+            return bytes(self._port.read_raw())
+        except Exception as error:
+            if "TMO" in str(error) or "timeout" in str(error).lower():
+                return b""
+            raise
+
+    def close(self) -> None:
+        """Release the resource."""
+        self._port.close()
+        self._manager.close()
+
+
+class Line:
+    """The conversation with one instrument.
+
+    Parameters
+    ----------
+    port : Port
+        The open port.
+    words : Words
+        The words of the instrument.
+    """
+
+    def __init__(self, port: Port, words: Words) -> None:
+        self._port, self._words = port, words
+        sleep(words.open_s)
+        for each in words.opening:
+            self.do(each, {})
+
+    def do(self, exchange: Exchange, values: Mapping[str, str | float]) -> re.Match[str] | None:
+        """Say the lines of an exchange, and await the reply to each; return the last reply.
+
+        Raises
+        ------
+        RefusedError
+            The instrument refused.
+        DeviceError
+            No reply, or none that was expected.
+        """
+        found = None
+        for text in exchange.say:
+            self.hear()
+            self.say(text, exchange, values)
+            found = None if exchange.reply is None else self._reply(exchange, filled(text, self._all(values)))
+        return found
+
+    def ask(self, exchange: Exchange, values: Mapping[str, str | float] | None = None) -> re.Match[str]:
+        """Ask a question, once more if its reply was spoilt, and return the reply; without words, await the next line.
+
+        Raises
+        ------
+        RefusedError, DeviceError
+            As for `do`.
+        """
+        for attempt in range(TRIES):
+            try:
+                found = self.do(exchange, values or {}) if exchange.say else self._reply(exchange, "nothing")
+            except DeviceError:
+                if attempt == TRIES - 1:
+                    raise
+            else:
+                if found is not None:
+                    return found
+        raise DeviceError(
+            f"{self._words.name} must have a reply in its words for {exchange.say}, but has none: add it."
+        )
+
+    def say(self, text: str, exchange: Exchange, values: Mapping[str, str | float]) -> None:
+        """Send a text without waiting for anything: a stop may come from any thread, during any question."""
+        self._port.write((filled(text, self._all(values)) + exchange.end).encode("latin-1"))
+
+    def hear(self, awaited: re.Pattern[str] | None = None) -> bool:
+        """Hear the lines that have come unasked; return whether one is awaited.
+
+        Raises
+        ------
+        RefusedError
+            One of the lines is a refusal.
+        """
+        found = False
+        while line := self._heard(0.0):
+            found |= awaited is not None and bool(awaited.search(line))
+        return found
+
+    def close(self, exchange: Exchange | None) -> None:
+        """Say the last words, and release the port."""
+        try:
+            if exchange is not None:
+                for text in exchange.say:
+                    self.say(text, exchange, {})
+        finally:
+            self._port.close()
+
+    def _all(self, values: Mapping[str, str | float]) -> dict[str, str | float]:
+        return {**self._words.settings, **values}
+
+    def _reply(self, exchange: Exchange, said: str) -> re.Match[str]:
+        until_s, others = monotonic() + exchange.within_s, []
+        awaited, found = exchange.reply, None
+        while awaited is not None and (left_s := until_s - monotonic()) > 0.0:
+            line = self._heard(left_s)
+            if not line:
+                continue
+            if (seen := awaited.search(line)) is None:
+                others.append(line)
+                continue
+            if found is not None or exchange.done is None:
+                return found or seen
+            awaited, found = exchange.done, seen
+        got = f"answered {', '.join(repr(each) for each in others[-3:])}" if others else "did not answer"
+        must = exchange.more.get("must", f"answer {said.strip()!r} by {exchange.reply and exchange.reply.pattern!r}")
+        raise DeviceError(
+            f"{self._words.name} must {must}, but {got} within {exchange.within_s:g} s: check its cable, its baud rate "
+            "and its words."
+        )
+
+    def _heard(self, within_s: float) -> str:
+        line = self._port.line(self._words.answer_end.encode("latin-1"), within_s).decode("latin-1").strip()
+        refusal = self._words.refusal
+        if line and refusal is not None and (found := refusal.search(line)):
+            raise RefusedError("refused", found[1] if refusal.groups and found[1] else line)
+        return line
+
+
+def opened_line(section: Section, words: Words) -> Line:
+    """Open the port that a section states, and begin the conversation.
+
+    Raises
+    ------
+    DataError, DeviceError
+        The port cannot be opened, or the instrument does not answer as its words say.
+    """
+    name = section.word("port")
+    try:
+        if "::" in name:
+            port: Port = VisaPort(name, words.baud if name.startswith("ASRL") and "baud" in section.values else None)
+        else:
+            port = SerialPort(name, words.baud, words.serial)
+    except ImportError as error:
+        section.refuse("port", f"is a VISA resource, which needs pyvisa ({error}): pip install 'fingervision[visa]'.")
+    except Exception as error:  # pyserial and each VISA library raise exceptions of their own classes
+        said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
+        section.refuse("port", f"must be that of {words.name}, but {name} could not be opened ({said}).")
+    try:
+        return Line(port, words)
+    except RefusedError as error:
+        port.close()
+        raise DeviceError(f"{words.name} at {name} must accept its first words, but refused them ({error}).") from error
+    except BaseException:
+        with suppress(Exception):
+            port.close()
+        raise

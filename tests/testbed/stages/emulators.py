@@ -1,0 +1,355 @@
+"""Controllers of stages in the network, written from their makers' protocols and apart from the kinds of stages."""
+
+import re
+import socket
+import struct
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from time import monotonic
+
+# GRBL and Marlin state their position in steps of a motor.
+STEPS_PER_MM = 8000.0
+
+
+class Plant:
+    """A stage that moves at constant speed: its position is exact, and it is asked from several threads."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._from = self._to = self._speed = self._began_s = 0.0
+        self.speed = 1.0
+        self.lost_mm = 0.0
+        self.homed = self.homing = False
+
+    def at(self) -> float:
+        with self._lock:
+            return self._at()
+
+    def _at(self) -> float:
+        way = self._to - self._from
+        done = min(abs(way), self._speed * (monotonic() - self._began_s))
+        return self._from + (done if way > 0 else -done)
+
+    @property
+    def target(self) -> float:
+        return self._to
+
+    @property
+    def moves(self) -> bool:
+        return monotonic() < self._began_s + abs(self._to - self._from) / max(self._speed, 1e-9)
+
+    def go(self, to: float, speed: float | None = None) -> None:
+        with self._lock:
+            self._from, self._to = self._at(), to + self.lost_mm
+            self._speed, self._began_s = speed or self.speed, monotonic()
+
+    def halt(self) -> None:
+        with self._lock:
+            self._from = self._to = self._at()
+
+
+class Emulator:
+    """A controller behind a socket; `unplug` cuts the connection, and `plug` makes it possible again.
+
+    A subclass states `end` of a line, `immediate` bytes that are answered without an end, and `answer`.
+    """
+
+    end = b"\n"
+    immediate = b""
+
+    def __init__(self) -> None:
+        self.plant, self.heard = Plant(), list[str]()
+        self.nonsense = self.silent = False
+        self._listener: socket.socket | None = None
+        self._client: socket.socket | None = None
+        self._number = 0
+        self.plug()
+
+    @property
+    def port(self) -> str:
+        return f"socket://127.0.0.1:{self._number}"
+
+    def plug(self) -> None:
+        self._listener = socket.create_server(("127.0.0.1", self._number))
+        self._number = self._listener.getsockname()[1]
+        threading.Thread(target=self._serve, args=(self._listener,), daemon=True).start()
+
+    def unplug(self) -> None:
+        for each in (self._listener, self._client):
+            if each is not None:
+                with suppress(OSError):
+                    each.shutdown(socket.SHUT_RDWR)
+                each.close()
+
+    close = unplug
+
+    def _serve(self, listener: socket.socket) -> None:
+        while True:
+            try:
+                self._client, _ = listener.accept()
+                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            except OSError:
+                return
+            threading.Thread(target=self._talk, args=(self._client,), daemon=True).start()
+
+    def _talk(self, client: socket.socket) -> None:
+        rest = b""
+        try:
+            while data := client.recv(4096):
+                rest = self._take(rest + data, client)
+        except OSError:
+            return
+
+    def _take(self, data: bytes, client: socket.socket) -> bytes:
+        line = b""
+        for k in range(len(data)):
+            byte = data[k : k + 1]
+            if byte in self.immediate and self.immediate:
+                self._reply(client, byte.decode("latin-1"))
+            elif byte == self.end:
+                self._reply(client, line.decode("latin-1"))
+                line = b""
+            else:
+                line += byte
+        return line
+
+    def _reply(self, client: socket.socket, line: str) -> None:
+        self.heard.append(line)
+        for said in self.answer(line):
+            if self.silent:
+                continue
+            text = "\x7f#" if self.nonsense else said
+            client.sendall(text.encode("latin-1") + self.answer_end)
+
+    answer_end = b"\r\n"
+
+    def answer(self, line: str) -> list[str]:
+        raise NotImplementedError
+
+    def later(self, seconds: float, act: Callable[[], None]) -> None:
+        timer = threading.Timer(seconds, act)
+        timer.daemon = True
+        timer.start()
+
+
+class Grbl(Emulator):
+    """GRBL 1.1: `?`, 0x85 and 0x18 at any time, jogs, homing that answers when it is done."""
+
+    immediate = b"?\x85\x18"
+    refuses = ""
+
+    def answer(self, line: str) -> list[str]:
+        plant = self.plant
+        if line == "?":
+            state = "Home" if plant.homing and plant.moves else "Jog" if plant.moves else "Idle"
+            return [f"<{state}|MPos:{plant.at():.4f},0.0000,0.0000|FS:0,0>"]
+        if line in "\x85\x18":
+            plant.halt()
+            if line == "\x18" and plant.homing:
+                plant.homing = False
+                return ["ALARM:6", "Grbl 1.1h ['$' for help]"]
+            return []
+        if line == "$I":
+            return ["[VER:1.1h.20190825:]", "[OPT:V,15,128]", "ok"]
+        if line == "$H":
+            plant.homing = True
+            plant.go(0.0, 5.0)
+            self.later(abs(plant.at()) / 5.0 + 0.01, self._home_done)
+            return []
+        if self.refuses:
+            return [self.refuses]
+        found = re.fullmatch(r"\$J=G90 G21 G53 X(-?[\d.]+) F([\d.]+)", line)
+        if not found:
+            return ["error:2"]
+        plant.go(float(found[1]), float(found[2]) / 60.0)
+        return ["ok"]
+
+    def _home_done(self) -> None:
+        if self.plant.homing and self._client is not None:
+            self.plant.homing = False
+            self._client.sendall(b"ok\r\n")
+
+
+class Marlin(Emulator):
+    """Marlin 2: M114 with the motor's count, G28 that blocks, M410."""
+
+    def answer(self, line: str) -> list[str]:
+        plant = self.plant
+        if line == "M115":
+            return [
+                "FIRMWARE_NAME:Marlin 2.1.2 (Github) PROTOCOL_VERSION:1.0",
+                "Cap:EEPROM:1",
+                "ok",
+            ]
+        if line == "M114":
+            steps = round(plant.at() * STEPS_PER_MM)
+            return [f"X:{plant.target:.2f} Y:0.00 Z:0.00 E:0.00 Count X:{steps} Y:0 Z:0", "ok"]
+        if line == "M410":
+            plant.halt()
+            return ["ok"]
+        if line == "G28 X":
+            plant.go(0.0, 5.0)
+            client = self._client
+            self.later(abs(plant.at()) / 5.0 + 0.01, lambda: client and client.sendall(b"echo:busy: processing\nok\n"))
+            return []
+        if found := re.fullmatch(r"G1 X(-?[\d.]+) F([\d.]+)", line):
+            plant.go(float(found[1]), float(found[2]) / 60.0)
+            return ["ok"]
+        return ["ok"] if line in ("G21", "G90") else [f'echo:Unknown command: "{line}"', "ok"]
+
+
+class PiGcs(Emulator):
+    """PI GCS 2.0: #5, SVO, VEL, MOV, POS?, FRF, STP, ERR?."""
+
+    immediate = b"\x05"
+    answer_end = b"\n"
+    error = 0
+
+    def answer(self, line: str) -> list[str]:
+        plant, words = self.plant, line.split()
+        match words:
+            case ["\x05"]:
+                return [f"{int(plant.moves):x}"]
+            case ["*IDN?"]:
+                return ["(c)2011 Physik Instrumente (PI) Karlsruhe, C-863.11,0,1.2.0"]
+            case ["POS?", "1"]:
+                return [f"1={plant.at():.6f}"]
+            case ["ERR?"]:
+                error, self.error = self.error, 0
+                return [str(error)]
+            case ["SVO", "1", "1"]:
+                pass
+            case ["VEL", "1", speed]:
+                plant.speed = float(speed)
+            case ["MOV", "1", to] if plant.homed:
+                plant.go(float(to))
+            case ["MOV", *_]:
+                self.error = 5  # unallowable move attempted on unreferenced axis
+            case ["FRF", "1"]:
+                plant.homed = True
+                plant.go(0.0, 5.0)
+            case ["STP"]:
+                plant.halt()
+                self.error = 10
+            case _:
+                self.error = 2
+        return []
+
+
+class SmarAct(Emulator):
+    """SmarAct MCS: ASCII commands in nanometres, each answered."""
+
+    answer_end = b"\n"
+
+    def answer(self, line: str) -> list[str]:
+        plant = self.plant
+        if line == ":GSI":
+            return [":ID2714728543"]
+        if line == ":GP0":
+            return [f":P0,{round(plant.at() * 1e6)}"]
+        if line == ":GS0":
+            return [f":S0,{(7 if plant.homing else 4) if plant.moves else 3}"]
+        if found := re.fullmatch(r":SCLS0,(\d+)", line):
+            plant.speed = int(found[1]) / 1e6
+        elif found := re.fullmatch(r":MPA0,(-?\d+),60000", line):
+            plant.go(int(found[1]) / 1e6)
+        elif line == ":FRM0,0,60000,1":
+            plant.go(0.0, 5.0)
+        elif line == ":S0":
+            plant.halt()
+        else:
+            return [":E-1,1"]
+        return [":E0,0"]
+
+
+class NewportEsp(Emulator):
+    """Newport ESP300: axis 1, commands end with a carriage return."""
+
+    end = b"\r"
+    units, motor_on, error = "2", False, "0, 451322, NO ERROR DETECTED"
+
+    def answer(self, line: str) -> list[str]:
+        plant = self.plant
+        match line:
+            case "1SN?":
+                return [self.units]
+            case "1TP":
+                return [f"{plant.at():.6f}"]
+            case "1MD?":
+                return [str(int(not plant.moves))]
+            case "TB?":
+                error, self.error = self.error, "0, 451322, NO ERROR DETECTED"
+                return [error]
+            case "1MO":
+                self.motor_on = True
+            case "1ST":
+                plant.halt()
+            case "1OR1":
+                plant.go(0.0, 5.0)
+            case _ if line.startswith("1VA"):
+                plant.speed = float(line[3:])
+            case _ if line.startswith("1PA") and self.motor_on:
+                plant.go(float(line[3:]))
+            case _ if line.startswith("1PA"):
+                self.error = "113, 4523, AXIS-1 MOTOR NOT ENABLED"
+            case _:
+                self.error = "6, 4523, COMMAND DOES NOT EXIST"
+        return []
+
+
+COUNTS_PER_MM = 34304.0
+PERIOD_S = 2048 / 6e6
+
+
+class Kinesis(Emulator):
+    """Thorlabs KDC101: binary messages of the Host-Controller Communications Protocol, channel 1, unit 0x50."""
+
+    fault = 0
+
+    def _take(self, data: bytes, client: socket.socket) -> bytes:
+        while len(data) >= 6:
+            message, first, second, to = struct.unpack_from("<HBBB", data)
+            size = 6 + (first + 256 * second if to & 0x80 else 0)
+            if len(data) < size:
+                break
+            whole, data = data[:size], data[size:]
+            self.heard.append(whole.hex())
+            back = self.message(message, first, second, whole[6:])
+            if back and not self.silent:
+                client.sendall(b"\xff" * 12 if self.nonsense else back)
+        return data
+
+    def message(self, number: int, first: int, second: int, data: bytes) -> bytes:
+        plant = self.plant
+        match number:
+            case 0x0210:
+                pass
+            case 0x0443:
+                plant.homing = True
+                plant.go(0.0, 5.0)
+            case 0x0465:
+                plant.halt()
+                return struct.pack("<HHBBHiiI", 0x0466, 14, 0x81, 0x50, 1, *self._place(), self._bits())  # stopped
+            case 0x0413:
+                _, _, _, speed = struct.unpack("<Hiii", data)
+                plant.speed = speed / (65536 * PERIOD_S) / COUNTS_PER_MM
+            case 0x0414:
+                return struct.pack("<HHBBHiii", 0x0415, 14, 0x81, 0x50, 1, 0, 263, 772981)
+            case 0x0453:
+                plant.homing = False
+                plant.go(struct.unpack("<Hi", data)[1] / COUNTS_PER_MM)
+            case 0x0411:
+                return struct.pack("<HHBBHi", 0x0412, 6, 0x81, 0x50, 1, self._place()[0])
+            case 0x0429:
+                return struct.pack("<HHBBHI", 0x042A, 6, 0x81, 0x50, 1, self._bits())
+        return b""
+
+    def _place(self) -> tuple[int, int]:
+        counts = round(self.plant.at() * COUNTS_PER_MM)
+        return counts, counts
+
+    def _bits(self) -> int:
+        moves = self.plant.moves
+        forward = self.plant.target > self.plant.at()
+        return 0x80000000 | self.fault | moves * (0x200 if self.plant.homing else 0x10 if forward else 0x20)
