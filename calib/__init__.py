@@ -14,15 +14,7 @@ Two dark bars of known width, rendered at 40 pixels per millimetre, give the sca
 ...     row = 200.0 - 150.0 * np.clip(0.5 - away, 0.0, 1.0)
 ...     return np.rint(np.tile(row, (300, 1))).astype(np.uint8)
 >>> known = [calib.KnownSize(f"{mm} mm", "bar", mm, 0.001, bar(40.0 * mm)) for mm in (3.0, 5.0)]
->>> edges = calib.find_widths(known)
->>> sizes = [
-...     calib.MeasuredSize(
-...         calib.Reference(each.name, each.size_mm, each.u_size_mm), edge.width_px, edge.u_width_px, edge.points_px,
-...         edge.light,
-...     )
-...     for each, edge in zip(known, edges)
-... ]
->>> fit = calib.scale_from_sizes(sizes, (400, 300), calib.Limits(), frozenset())
+>>> fit = calib.scale_from_pictures(known)
 >>> round(fit.calibration.px_per_mm, 2)
 40.0
 """
@@ -60,6 +52,7 @@ _HOMES = {
     "response_from_exposures": "response_from_exposures",
     "scale_from_board": "scale_from_board",
     "scale_from_lines": "scale_from_lines",
+    "scale_from_pictures": "scale_from_sizes",
     "scale_from_sizes": "scale_from_sizes",
     "standard_response": "camera_response",
 }

@@ -28,5 +28,6 @@ from calib.scale_from_lines import LineScaleFit as LineScaleFit
 from calib.scale_from_lines import scale_from_lines as scale_from_lines
 from calib.scale_from_sizes import MeasuredSize as MeasuredSize
 from calib.scale_from_sizes import ScaleFit as ScaleFit
+from calib.scale_from_sizes import scale_from_pictures as scale_from_pictures
 from calib.scale_from_sizes import scale_from_sizes as scale_from_sizes
 from calib.stated_scale import StatedScale as StatedScale

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from calib import contributions
 from calib.picture_shift import change_of_distance_px, lens_shift_px, tilt_shift_px
+from calib.short_repr import ShortRepr
 
 if TYPE_CHECKING:
     from calib.measured_scale import Calibration
@@ -19,8 +20,8 @@ Floats = NDArray[np.float64]
 LENS_STEP = 0.1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BudgetLine:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BudgetLine(ShortRepr):
     """One source of uncertainty, with its contribution to n distances.
 
     Parameters
@@ -41,8 +42,8 @@ class BudgetLine:
     shared: bool = True
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Budget:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Budget(ShortRepr):
     """All sources of uncertainty of n distances."""
 
     lines: tuple[BudgetLine, ...]

@@ -15,6 +15,7 @@ from calib.lens import Lens
 from calib.limits import Limits
 from calib.picture_shift import centre_px
 from calib.plane import Plane
+from calib.short_repr import ShortRepr
 
 Floats = NDArray[np.float64]
 
@@ -40,8 +41,8 @@ class Reference:
     date: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ScalePart:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ScalePart(ShortRepr):
     """Contribution of one cause to the covariance of scale and edge bias.
 
     Parameters
@@ -59,8 +60,8 @@ class ScalePart:
     supplied: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Response:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Response(ShortRepr):
     """Derivatives of the fitted (px_per_mm, edge_bias_px) by lens distortion and tilt during the calibration.
 
     Parameters
@@ -75,8 +76,8 @@ class Response:
     tilt: Floats = field(default_factory=lambda: np.zeros((2, 2)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Calibration:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Calibration(ShortRepr):
     """Conversion of a flat scene from pixels to millimetres, with uncertainty.
 
     For a light gap, gap_mm = (gap_px + b) / s.

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from calib.errors import CalibrationError
+from calib.known_widths import KnownSize, find_widths
 from calib.limits import Limits, rectangular
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
+from calib.parallel_edges import ParallelEdges
 from calib.picture_shift import change_of_distance_px, lens_shift_px, tilt_shift_px
 from calib.straight_line import StraightLine, line_through_origin, line_with_errors
 
@@ -44,6 +46,13 @@ class MeasuredSize:
     points_px: Floats
     light: bool
 
+    @classmethod
+    def of(cls, known: KnownSize, edges: ParallelEdges, certificate: str = "", date: str = "") -> "MeasuredSize":
+        """Combine the certified size in a picture with the edges that `find_widths` found there."""
+        what = f"{known.kind} {known.name}"
+        reference = Reference(what, known.size_mm, known.u_size_mm, certificate, date)
+        return cls(reference, edges.width_px, edges.u_width_px, edges.points_px, edges.light)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScaleFit:
@@ -73,10 +82,40 @@ class ScaleFit:
     probability: float
 
 
+def scale_from_pictures(
+    pictures: Sequence[KnownSize],
+    region: tuple[int, int, int, int] | None = None,
+    limits: Limits | None = None,
+    stated: frozenset[str] = frozenset(),
+) -> ScaleFit:
+    """Measure bars and slots of known size in their pictures, and fit scale and edge bias to them.
+
+    Parameters
+    ----------
+    pictures : sequence of KnownSize
+        At least one picture; all have the same size in pixels and the same scale.
+    region : tuple of int, optional
+        x, y, width and height of the part of every picture to be searched.
+    limits, stated
+        As in `scale_from_sizes`.
+
+    Raises
+    ------
+    CalibrationError
+        If there is no object, several objects, a clipped flank, or sizes that contradict each other.
+    """
+    if len({known.grey.shape for known in pictures}) > 1:
+        told = ", ".join(f"{known.name} {known.grey.shape[1]}x{known.grey.shape[0]}" for known in pictures)
+        raise CalibrationError(f"All pictures must have the same size in pixels, but their sizes are {told}.")
+    sizes = [MeasuredSize.of(*each) for each in zip(pictures, find_widths(pictures, region), strict=True)]
+    height, width = pictures[0].grey.shape
+    return scale_from_sizes(sizes, (width, height), limits, stated)
+
+
 def scale_from_sizes(
     sizes: Sequence[MeasuredSize],
     frame_size_px: tuple[int, int],
-    limits: Limits,
+    limits: Limits | None = None,
     stated: frozenset[str] = frozenset(),
     response_shift_px: float = 0.0,
 ) -> ScaleFit:
@@ -93,7 +132,7 @@ def scale_from_sizes(
     frame_size_px : tuple of int
         Width and height of the pictures.
     limits, stated
-        Limits of the set-up's imperfections, and the names of those that the user stated.
+        Limits of the set-up's imperfections (None takes the defaults), and the names of those that the user stated.
     response_shift_px : float
         Largest excess of a light gap's measured width because the camera response is assumed; 0 if the response is
         known. The true excess lies between 0 and this value; the standard uncertainty is that of a rectangular
@@ -101,6 +140,7 @@ def scale_from_sizes(
     """
     if not sizes:
         raise CalibrationError("A scale needs at least one object of known size, but there is none.")
+    limits = limits or Limits()
     polarity = np.array([1.0 if size.light else -1.0 for size in sizes])
     x = polarity * np.array([size.reference.size_mm for size in sizes])
     y = polarity * np.array([size.width_px for size in sizes])

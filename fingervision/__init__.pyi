@@ -5,6 +5,7 @@ from fingervision.domain.errors import DataError as DataError
 from fingervision.domain.errors import DeviceError as DeviceError
 from fingervision.domain.errors import FingervisionError as FingervisionError
 from fingervision.domain.errors import InputFileError as InputFileError
+from fingervision.domain.errors import InstallationError as InstallationError
 from fingervision.domain.errors import LimitError as LimitError
 from fingervision.domain.errors import MissingLibraryError as MissingLibraryError
 from fingervision.domain.errors import ModelError as ModelError
@@ -14,8 +15,14 @@ from fingervision.domain.errors import ProcessError as ProcessError
 from fingervision.domain.errors import StateError as StateError
 from fingervision.domain.errors import UnknownNameError as UnknownNameError
 from fingervision.domain.errors import UsageError as UsageError
+from fingervision.domain.frame import Coding as Coding
+from fingervision.domain.frame import Frame as Frame
+from fingervision.domain.frame import LostFrame as LostFrame
 from fingervision.domain.parameter import Parameter as Parameter
+from fingervision.domain.status import Status as Status
 from fingervision.effects.effect_list import EffectList
+from fingervision.frames.source import Description as Description
+from fingervision.frames.source import FrameSource as FrameSource
 from fingervision.interface.calibrate import calibrate as calibrate
 from fingervision.interface.calibration import Calibration as Calibration
 from fingervision.interface.comparison import Comparison as Comparison
@@ -29,6 +36,8 @@ from fingervision.interface.simulation import Simulation as Simulation
 from fingervision.interface.simulation import simulate as simulate
 from fingervision.interface.tables import read_model as read_model
 from fingervision.interface.tables import read_table as read_table
+from fingervision.plugins.faults import PluginError as PluginError
+from fingervision.tables.questions import OpenQuestionError as OpenQuestionError
 
 __version__: str
 effects: EffectList

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.short_repr import ShortRepr
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DriveHistory:
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class DriveHistory(ShortRepr):
     """Input displacement over time.
 
     Parameters

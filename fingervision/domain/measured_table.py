@@ -8,11 +8,12 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.short_repr import ShortRepr
 from fingervision.domain.reference_slot import ReferenceSlot
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Channel:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Channel(ShortRepr):
     """A user-named column of a table: position (mm) or rotation (mrad) of a body or point of the mechanism.
 
     Parameters
@@ -30,8 +31,8 @@ class Channel:
     u: NDArray[np.float64] | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RecordedPath:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class RecordedPath(ShortRepr):
     """All rows with an input, with or without a measured gap; run after run, each run sorted by time.
 
     Parameters
@@ -50,8 +51,8 @@ class RecordedPath:
     rows: NDArray[np.intp]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MeasuredTable:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class MeasuredTable(ShortRepr):
     """Rows of a measured table that have a gap, run after run, each run sorted by time.
 
     Parameters

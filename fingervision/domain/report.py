@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
 
+from calib.short_repr import ShortRepr
 from fingervision.domain.parameter import Estimate
 
 
@@ -120,8 +121,8 @@ class NextRun:
     words: str
 
 
-@dataclass(frozen=True, slots=True)
-class DiagnosisReport:
+@dataclass(frozen=True, slots=True, repr=False)
+class DiagnosisReport(ShortRepr):
     """The result of a diagnosis, with the fields of report.json.
 
     `explained_share` is 1 - (after / before)^2 and `standing_share` is after / before, where `before` and `after` are

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.short_repr import ShortRepr
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Response:
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Response(ShortRepr):
     """Positions of the measuring points of both fingers over an input history, and the drive force if known.
 
     Parameters

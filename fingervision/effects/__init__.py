@@ -4,14 +4,16 @@ The catalogue also contains effects from other distributions (entry points of th
 files, and from the present session.
 """
 
+import copyreg
 import importlib
 import pkgutil
 import sys
 from contextlib import AbstractContextManager
 from functools import cache
 from pathlib import Path
+from typing import Any
 
-from fingervision.domain.effect import Effect, Stage
+from fingervision.domain.effect import DriveEffect, Effect, PointEffect, Stage
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.effects.effect_list import EffectList
 from fingervision.effects.trial import BUILT_IN, effects_in
@@ -20,6 +22,21 @@ from fingervision.plugins.registry import Registry
 from fingervision.plugins.watched_import import importing
 
 __all__ = ["REGISTRY", "added_effects", "catalogue", "origin_of", "register", "that_show", "withdraw"]
+
+
+def _pickled(effect: Effect) -> str | tuple[Any, ...]:
+    """Pickle an effect of this package by its name, because its functions may be lambdas; another effect as it is."""
+    if _built_in().get(effect.name) is effect:
+        return _unpickled, (effect.name,)
+    return object.__reduce_ex__(effect, 2)
+
+
+def _unpickled(name: str) -> Effect:
+    return _built_in()[name]
+
+
+for _kind in (Effect, DriveEffect, PointEffect):
+    copyreg.pickle(_kind, _pickled)
 
 
 @cache

@@ -1,15 +1,17 @@
-"""Pictures in memory as a recording: numpy arrays of any bit depth, grey or colour."""
+"""Pictures in memory as a recording: numpy arrays of any bit depth, grey or colour, all at once or one by one."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import ArgumentError
+from fingervision.domain.errors import ArgumentError, StateError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
-from fingervision.frames.array_levels import levels_of, stated_shape
+from fingervision.frames.array_levels import COLOURS, levels_of, stated_shape
 from fingervision.frames.source import Description
 
 HASH_DIGITS = 12
@@ -53,10 +55,7 @@ class ArrayFrames:
 
     def __post_init__(self) -> None:
         stack = stated_shape(self.pictures)
-        if self.rate_hz is not None and self.times_s is not None:
-            raise ArgumentError("rate_hz", "be left out if times_s is given", "both are given")
-        if self.rate_hz is not None and not 0.0 < self.rate_hz < float("inf"):
-            raise ArgumentError("rate_hz", "be positive", f"is {self.rate_hz:g}")
+        _check_rate(self.rate_hz, self.times_s)
         times_s = None if self.times_s is None else _checked_times(self.times_s, len(stack))
         whole = hashlib.sha256(f"{stack.shape} {stack.dtype.str}".encode())
         for picture in stack:
@@ -97,6 +96,124 @@ class ArrayFrames:
         return None if self.rate_hz is None else index / self.rate_hz
 
 
+@dataclass(eq=False)
+class PictureStream:
+    """Pictures that an iterable yields one by one, as a recording; only one picture is in memory at a time.
+
+    A list or another iterable that can be read again is a recording like any other. The pictures of a generator can be
+    read only once.
+
+    Parameters
+    ----------
+    pictures : iterable of ndarray, shape (height, width[, colours])
+        Pictures of equal size, with levels as in `ArrayFrames`.
+    rate_hz : float or None
+        Pictures per second.
+    times_s : sequence of float or None
+        Time of every picture; strictly increasing.
+    coding : Coding
+        Compression that the pictures underwent before they were decoded.
+
+    Raises
+    ------
+    ArgumentTypeError
+        The first picture is not a numeric numpy array.
+    ArgumentError
+        There is no picture, or it has not the shape of a single picture.
+    """
+
+    pictures: Iterable[NDArray[np.generic]] = field(repr=False)
+    rate_hz: float | None = None
+    times_s: Sequence[float] | None = None
+    coding: Coding = Coding.LOSSLESS
+    description: Description = field(init=False)
+    _read: Iterator[NDArray[np.generic]] | None = field(init=False, repr=False)
+    _first: NDArray[np.generic] = field(init=False, repr=False)
+    _is_once: bool = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        _check_rate(self.rate_hz, self.times_s)
+        count = len(self.pictures) if hasattr(self.pictures, "__len__") else None
+        if self.times_s is not None:
+            self.times_s = _checked_times(self.times_s, len(self.times_s) if count is None else count)
+        rest = iter(self.pictures)
+        self._is_once = rest is self.pictures
+        first = next(rest, None)
+        if first is None:
+            raise ArgumentError("source", "yield at least one picture", "yields none")
+        self._first = _single(first, 0)
+        self._read = chain([first], rest)
+        self.description = Description(
+            name="pictures",
+            kind="pictures in memory",
+            codec=str(first.dtype),
+            coding=self.coding,
+            width_px=int(self._first.shape[1]),
+            height_px=int(self._first.shape[0]),
+            rate_hz=self.rate_hz,
+            has_times=self.rate_hz is not None or self.times_s is not None,
+            frame_count=count,
+        )
+
+    def __iter__(self) -> Iterator[Frame | LostFrame]:
+        """Yield the pictures as they come; each is checked and converted when it is yielded.
+
+        Raises
+        ------
+        StateError
+            The pictures come from a generator that was read before.
+        ArgumentError
+            A picture differs in size or type from the first, or has no time.
+        """
+        pictures, self._read = self._read, None
+        if pictures is None:
+            if self._is_once:
+                raise StateError(
+                    "The pictures of a generator can be read only once, and were read: give a list or an array to "
+                    "look at the pictures again."
+                )
+            pictures = iter(self.pictures)
+        for index, picture in enumerate(pictures):
+            single = _single(picture, index)
+            if single.shape != self._first.shape or single.dtype != self._first.dtype:
+                must = f"yield pictures like the first ({self._first.dtype}, shape {self._first.shape})"
+                found = f"picture {index} is {single.dtype} of shape {single.shape}"
+                raise ArgumentError("source", must, found)
+            yield Frame(levels_of(single, f" of picture {index}"), index, self._time_s(index), self.coding)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State without what cannot be pickled: the pictures of a generator."""
+        return {**self.__dict__, "_read": None} | ({"pictures": ()} if self._is_once else {})
+
+    @property
+    def has_float_levels(self) -> bool:
+        """Whether the levels were given as floats, which are converted to 16-bit levels."""
+        return bool(self._first.dtype.kind == "f")
+
+    def _time_s(self, index: int) -> float | None:
+        if self.times_s is None:
+            return None if self.rate_hz is None else index / self.rate_hz
+        if index >= len(self.times_s):
+            raise ArgumentError("times_s", "have a time for every picture", f"ends before picture {index}")
+        return self.times_s[index]
+
+
+def _single(picture: object, index: int) -> NDArray[np.generic]:
+    """Check that something that was yielded is one picture, of shape (height, width) or (height, width, colours)."""
+    stack = stated_shape(picture, "source" if index == 0 else f"source, picture {index},")
+    if len(stack) > 1 or np.ndim(picture) > 3:  # type: ignore[arg-type]
+        must = f"yield pictures of shape (height, width) or (height, width, {' or '.join(map(str, COLOURS))})"
+        raise ArgumentError("source", must, f"picture {index} has shape {np.shape(picture)}")  # type: ignore[arg-type]
+    return stack[0]
+
+
+def _check_rate(rate_hz: float | None, times_s: Sequence[float] | None) -> None:
+    if rate_hz is not None and times_s is not None:
+        raise ArgumentError("rate_hz", "be left out if times_s is given", "both are given")
+    if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
+        raise ArgumentError("rate_hz", "be positive", f"is {rate_hz:g}")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptFrames:
     """Frames of a camera that were kept in memory, as a recording.
@@ -129,4 +246,4 @@ def _checked_times(times_s: Sequence[float], count: int) -> tuple[float, ...]:
     return tuple(times.tolist())
 
 
-__all__ = ["ArrayFrames", "KeptFrames", "Pixels"]
+__all__ = ["ArrayFrames", "KeptFrames", "PictureStream", "Pixels"]

@@ -60,15 +60,7 @@ def on_sizes(
     edges = find_widths(pictures, region)
     shift_px = read_with.shift_px(stored, edges, region)
     sizes = [
-        MeasuredSize(
-            Certified(
-                f"{picture.kind} {picture.name}", picture.size_mm, picture.u_size_mm, noted.certificate, noted.date
-            ),
-            edge.width_px,
-            edge.u_width_px,
-            edge.points_px,
-            edge.light,
-        )
+        MeasuredSize.of(picture, edge, noted.certificate, noted.date)
         for picture, edge in zip(pictures, edges, strict=True)
     ]
     height, width = pictures[0].grey.shape

@@ -134,7 +134,8 @@ class Diagnosis:
     def write(self, out: Path) -> dict[str, object]:
         """Write the files of the diagnosis into an existing folder, and return the content of report.json."""
         with out_folder(out), added(self.own_effects):
-            document = write_answer(out, self.found, own_base(self.model, out), self.made, self.measured)
+            base = own_base(self.model, out, self.found.data.chain.model)
+            document = write_answer(out, self.found, base, self.made, self.measured)
         mark_owner(out, self.measured)
         return document
 
@@ -165,8 +166,9 @@ def diagnose(
     ----------
     measured : path, Measurement, MeasuredTable, DataFrame or mapping of columns
         `input_mm,gap_mm[,run,time_s,left_mm,right_mm,u_random_mm,force_n]`; a measurement needs a drive.
-    model : path, CorrectedModel, Diagnosis, or a simulation as DataFrame or mapping of columns
-        The model to be diagnosed.
+    model : path, callable, CorrectedModel, Diagnosis, or a simulation as DataFrame or mapping of columns
+        The model to be diagnosed. A callable takes times (s, from 0) and inputs (mm) of shape (n,), and returns the gap
+        of shape (n,), or a mapping with `gap_mm` or `left_mm` and `right_mm`, and `force_n` if there is a force.
     with_effects, without_effects : iterable of str
         Effects that every explanation must include, or must not include.
     effects : iterable of Effect

@@ -1,7 +1,9 @@
 """Open a recording from a file name, the number of a camera, an array, or a frame source."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -10,16 +12,26 @@ import numpy as np
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UsageError
 from fingervision.domain.frame import Coding
 from fingervision.frames.array_levels import what_it_is
-from fingervision.frames.arrays import ArrayFrames, KeptFrames
-from fingervision.frames.source import FrameSource, Wish, open_source
+from fingervision.frames.arrays import ArrayFrames, KeptFrames, PictureStream
+from fingervision.frames.source import Description, FrameSource, Wish, open_source
 from fingervision.interface.argument_checks import number, one_of, whole_number
 
 MUST = (
-    "be a picture or a stack of pictures (numpy array), the name of a video, folder, image or glob, or a camera's "
-    "number"
+    "be a picture or a stack of pictures (numpy array), an iterable of pictures, the name of a video, folder, image or "
+    "glob, a camera's number, or a FrameSource"
 )
 
 Opener = Callable[[], FrameSource]
+
+
+@dataclass(frozen=True, slots=True)
+class _Same:
+    """Opener of a recording that need not be opened anew; a function could not be pickled."""
+
+    source: FrameSource
+
+    def __call__(self) -> FrameSource:
+        return self.source
 
 
 def recording_of(
@@ -52,7 +64,11 @@ def recording_of(
     if isinstance(source, np.ndarray) or hasattr(source, "__array__"):
         _refuse_frames(frames)
         pictures = ArrayFrames(source, rate_hz, times_s, stored)
-        return lambda: pictures
+        return _Same(pictures)
+    if _yields_pictures(source):
+        _refuse_frames(frames)
+        stream = PictureStream(source, rate_hz, times_s, stored)
+        return _Same(stream)
     if times_s is not None:
         raise UsageError(
             "times_s is for arrays only: leave it out, and put the times of a folder of images into its times.csv."
@@ -60,17 +76,41 @@ def recording_of(
     if stored is not Coding.LOSSLESS:
         raise UsageError("coding is for arrays only, since a file states its own coding: leave it out.")
     if isinstance(source, bool) or not isinstance(source, str | os.PathLike | int | np.integer):
-        if hasattr(source, "description") and hasattr(source, "__iter__"):
-            given: FrameSource = source
-            return _camera(given, frames) if hasattr(given, "received") else _recording(lambda: given, frames)
-        advice = "numpy.stack(...) makes one array of equal pictures" if isinstance(source, list | tuple) else ""
-        raise ArgumentTypeError("source", MUST, f"is {what_it_is(source)}", advice)
+        if not hasattr(source, "description"):
+            raise ArgumentTypeError("source", MUST, f"is {what_it_is(source)}")
+        given = _own_source(source)
+        return _camera(given, frames) if hasattr(given, "received") else _recording(_Same(given), frames)
     name = str(int(source)) if isinstance(source, int | np.integer) else os.fspath(source)
     wish = Wish(rate_hz=rate_hz)
     opened = open_source(str(name), wish)
     if hasattr(opened, "received"):
         return _camera(opened, frames)
-    return _recording(lambda: open_source(str(name), wish), frames)
+    return _recording(partial(open_source, str(name), wish), frames)
+
+
+def _yields_pictures(source: Any) -> bool:
+    """Whether a source is an iterable of pictures: neither a name, nor a source with a description of its own."""
+    if isinstance(source, str | bytes | os.PathLike | Mapping) or hasattr(source, "description"):
+        return False
+    return hasattr(source, "__iter__") or hasattr(source, "__next__")
+
+
+def _own_source(source: Any) -> FrameSource:
+    """Check that a user's class has what a frame source must have, and name what is missing.
+
+    Raises
+    ------
+    ArgumentTypeError
+        The class cannot be iterated, or its description is none.
+    """
+    if not hasattr(source, "__iter__"):
+        must = "have a method __iter__ that yields fingervision.Frame or fingervision.LostFrame"
+        raise ArgumentTypeError("source", must, f"is {what_it_is(source)} without it")
+    if not isinstance(source.description, Description):
+        must = "have a `description` that is a fingervision.Description"
+        raise ArgumentTypeError("source", must, f"has {what_it_is(source.description)}")
+    found: FrameSource = source
+    return found
 
 
 def _recording(opener: Opener, frames: int | None) -> Opener:
@@ -94,7 +134,7 @@ def _camera(source: Any, frames: int | None) -> Opener:
         kept = KeptFrames(source.description, tuple(islice(iter(source), count)))
     finally:
         source.close()
-    return lambda: kept
+    return _Same(kept)
 
 
 __all__ = ["Opener", "recording_of"]

@@ -1,6 +1,6 @@
 """`fingervision.measure`: the finger gap in a picture, a recording or a camera's next frames."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ FLOAT_BITS = 16
 
 @speaks_python
 def measure(
-    source: "NDArray[np.generic] | str | os.PathLike[str] | int | FrameSource",
+    source: "NDArray[np.generic] | Iterable[NDArray[np.generic]] | str | os.PathLike[str] | int | FrameSource",
     *,
     calibration: "str | os.PathLike[str] | Calibration | None" = None,
     px_per_mm: float | None = None,
@@ -67,12 +67,13 @@ def measure(
 
     Parameters
     ----------
-    source : ndarray, path, int or FrameSource
+    source : ndarray, iterable of ndarray, path, int or FrameSource
         Either an array: one picture of shape (height, width) or (height, width, 3), or a stack of pictures with the
         frames as first dimension, in uint8, uint16, or float from 0 (black) to 1 (full scale). Colours are red, green,
         blue; an alpha channel must be opaque. A three-dimensional array is a single picture in colour if its last
-        dimension is 3 or 4. Or the name of a video file, an image, a folder of images, a glob, a camera or a stream; or
-        the number of a camera.
+        dimension is 3 or 4. Or a list, a generator or another iterable of single pictures of equal size, of which
+        only one is in memory at a time. Or the name of a video file, an image, a folder of images, a glob, a camera or
+        a stream; or the number of a camera; or an object of a user's class, with `description` and `__iter__`.
     calibration : path, Calibration or None
         The scale with its uncertainty; one of `calibration` and `px_per_mm` is required.
     px_per_mm : float or None

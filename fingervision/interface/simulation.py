@@ -195,8 +195,9 @@ def simulate(
 
     Parameters
     ----------
-    model : path, CorrectedModel, Diagnosis, DataFrame or mapping of columns
-        A simulation table, gripper.toml, model.toml, FMU or Python file; or a model in memory.
+    model : path, callable, CorrectedModel, Diagnosis, DataFrame or mapping of columns
+        A simulation table, gripper.toml, model.toml, FMU or Python file; or a model in memory, which may be a function
+        of times (s) and inputs (mm), see `fingervision.diagnose`.
     drive : path, DriveHistory, DataFrame or mapping with time_s and input_mm, or inputs in mm of shape (n,)
         The input over time. An array of inputs has no times, but a model with effects that have memory needs times.
     kind : str

@@ -18,7 +18,7 @@ from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.column_tables import columns_of, measured_from_columns, simulation_from_columns
 from fingervision.interface.measurement import Measurement
 from fingervision.models.corrected import CorrectedModel
-from fingervision.models.function_model import model_file
+from fingervision.models.function_model import FunctionModel, model_file
 from fingervision.models.kinds import kinds
 from fingervision.models.table import TableModel
 from fingervision.tables import read as tables
@@ -177,7 +177,7 @@ def measured_given(measured: Any, columns: Any = None) -> Given:
 
 
 def model_given(model: Any, kind: str, columns: Any = None) -> Given:
-    """Interpret an argument as a model: a file, a CorrectedModel, a Diagnosis, or columns of a simulation table.
+    """Interpret an argument as a model: a file, a function, a CorrectedModel, a Diagnosis, or columns of a table.
 
     Raises
     ------
@@ -190,12 +190,19 @@ def model_given(model: Any, kind: str, columns: Any = None) -> Given:
         path = model_file(path_of("model", model, "a model's file"))
         return Given(read_model(path, kind, columns), path)
     model = getattr(model, "corrected_model", model)
+    if callable(model):
+        called = getattr(model, "__name__", type(model).__name__)
+        base = FunctionModel(Path(called), function=model)
+        return Given(CorrectedModel(called, base, "", (-np.inf, np.inf), {}), IN_MEMORY / called)
     if isinstance(model, TableModel):
         path = _name_of("simulation", model.input_mm, model.left_mm, model.right_mm)
         return Given(CorrectedModel(model.name, model, "", model.input_range_mm, {}), path)
     if isinstance(model, CorrectedModel):
         return Given(model, Path(model.base_path) if model.base_path else IN_MEMORY / model.name)
-    must = "a model's file name, CorrectedModel, Diagnosis, DataFrame or mapping with input_mm and gap_mm"
+    must = (
+        "a model's file name, a function of times and inputs, CorrectedModel, Diagnosis, DataFrame or mapping with "
+        "input_mm and gap_mm"
+    )
     if isinstance(model, np.ndarray) or not (isinstance(model, Mapping) or hasattr(model, "columns")):
         raise ArgumentTypeError("model", f"be {must}", f"is {what_it_is(model)}")
     return model_given(simulation_from_columns(columns_of("model", model, must)), kind)
@@ -255,23 +262,33 @@ def effect_names(argument: str, names: Any) -> frozenset[str]:
     return frozenset(listed)
 
 
-def own_base(model: CorrectedModel, out: Path) -> CorrectedModel:
-    """Save a simulation table that is in memory to a file, to which a corrected model can refer.
+def own_base(model: CorrectedModel, out: Path, at_rest: Any = None) -> CorrectedModel:
+    """Save a model that is in memory to a file, to which a corrected model can refer; other models stay unchanged.
 
-    Models of other kinds are returned unchanged.
+    Parameters
+    ----------
+    model : CorrectedModel
+        The model.
+    out : Path
+        An existing folder.
+    at_rest : TableModel or None
+        Response at rest of a model that is a function. The function itself cannot be saved; the file says so.
 
     Raises
     ------
     OutputError
         The file cannot be written.
     """
-    if model.base_path or not isinstance(model.base, TableModel):
+    is_function = isinstance(model.base, FunctionModel) and model.base.function is not None
+    base = at_rest if is_function else model.base
+    if model.base_path or not isinstance(base, TableModel):
         return model
     from fingervision.storage.simulation_csv import write_simulation
 
     path = out / "simulation.csv"
+    words = f"Response at rest of the function {model.name}; its motion over time is not in this table."
     try:
-        write_simulation(path, model.base.input_mm, model.base.respond(model.base.input_mm))
+        write_simulation(path, base.input_mm, base.respond(base.input_mm), comment=words if is_function else "")
     except FingervisionError:
         raise
     except OSError as error:

@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from calib.short_repr import ShortRepr
 from fingervision.domain.model import Model
 from fingervision.domain.parameter import Estimate
 
 
-@dataclass(frozen=True, slots=True)
-class CorrectedModel:
+@dataclass(frozen=True, slots=True, repr=False)
+class CorrectedModel(ShortRepr):
     """A base model and the parameters of the effects added to it; the diagnosis evaluates the effects.
 
     Parameters

@@ -1,10 +1,10 @@
-"""A model that is a function of time: an FMU, or a Python file with `simulate(time_s, input_mm)`."""
+"""A model that is a function of time: an FMU, a Python file with `simulate(time_s, input_mm)`, or such a function."""
 
 import json
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -34,6 +34,12 @@ SETTLED = 1e-4
 """Largest change of the gap in the second half of a hold that counts as settled, as a share of the gap's range."""
 
 
+Answer = Mapping[str, Array]
+Function = Callable[[Array, Array], Any]
+"""Function of times and inputs, shape (n,) each, that returns the gap, or a mapping with `gap_mm` or `left_mm` and
+`right_mm`, and where there is one `force_n`, shape (n,) each."""
+
+
 def model_file(path: Path) -> Path:
     """Return the file of a model; a Python file may be followed by the name of its function, as `model.py:simulate`.
 
@@ -54,18 +60,21 @@ def model_file(path: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class FunctionModel:
-    """A file that predicts the gap over time from the input over time.
+    """A file or a function that predicts the gap over time from the input over time.
 
     Parameters
     ----------
     path : Path
-        `.fmu` (FMI 2 or 3, model exchange or co-simulation) or `.py`.
+        `.fmu` (FMI 2 or 3, model exchange or co-simulation) or `.py`; for a function, its name.
     names : mapping of str to str
         Names of the FMU's variables for `input` and `gap`, if its variables are named otherwise.
+    function : callable or None
+        A function in memory; it is called in this process, because it may belong to a notebook.
     """
 
     path: Path
     names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    function: Function | None = None
 
     def respond(self, input_mm: Array) -> Response:
         """Static response at each input, which is held until the gap has settled; `input_mm` of shape (n,)."""
@@ -114,7 +123,7 @@ class FunctionModel:
         return TableModel(self.path.name, up, mean(last.left_mm), mean(last.right_mm), force)
 
     def simulate(self, runs: Sequence[tuple[Array, Array]]) -> list[Response]:
-        """Simulate the runs in a separate process, each run from its own initial state.
+        """Simulate the runs, each from its own initial state; a file is run in a separate process.
 
         Parameters
         ----------
@@ -126,6 +135,8 @@ class FunctionModel:
         ModelError
             If the file cannot be run, crashes, does not end, or returns something that is not a number.
         """
+        if self.function is not None:
+            return [_response(self._called(self.function, *run), 0) for run in runs]
         with TemporaryDirectory(prefix="fingervision-") as folder:
             asked, answered = Path(folder) / "asked.npz", Path(folder) / "answered.npz"
             arrays: dict[str, Any] = {
@@ -148,6 +159,16 @@ class FunctionModel:
             with np.load(answered) as found:
                 return [_response(found, k) for k in range(len(runs))]
 
+    def _called(self, function: Function, time_s: Array, input_mm: Array) -> dict[str, Array]:
+        """Call a function in memory for one run."""
+        try:
+            points = points_of(answer_of(function, time_s, input_mm), time_s)
+        except ValueError as error:
+            raise ModelError(f"The function {self.path} {error}") from error
+        except Exception as error:
+            raise ModelError(f"The function {self.path} failed: {type(error).__name__}: {error}") from error
+        return {f"{name}0": values for name, values in points.items()}
+
     def _failure(self, code: int, stderr: bytes) -> str:
         """Explain in a message how the worker process failed."""
         said = stderr.decode(errors="replace").strip().splitlines()
@@ -166,3 +187,39 @@ SAYS = "fingervision-model: "
 
 def _response(found: Mapping[str, Array], k: int) -> Response:
     return Response(found[f"left_mm{k}"], found[f"right_mm{k}"], found.get(f"force_n{k}"))
+
+
+def answer_of(function: Function, time_s: Array, input_mm: Array) -> Answer:
+    """Call a user's function with copies of the times and inputs; an array as the answer is the gap."""
+    found = function(time_s.copy(), input_mm.copy())
+    return found if isinstance(found, Mapping) else {"gap_mm": found}
+
+
+def points_of(answer: Answer, time_s: Array) -> dict[str, Array]:
+    """Convert a model's return value to left, right and force; refuse a value without one finite number per time."""
+    out: dict[str, Array] = {}
+    for name in ("gap_mm", "left_mm", "right_mm", "force_n"):
+        if name not in answer:
+            continue
+        try:
+            values = np.asarray(answer[name], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"must give numbers for {name}, but gives {type(answer[name]).__name__}.") from None
+        if values.shape != time_s.shape:
+            raise ValueError(
+                f"must give {time_s.size} values of {name}, one for each time, but gives shape {values.shape}."
+            )
+        if not np.all(np.isfinite(values)):
+            at_s = float(time_s[np.flatnonzero(~np.isfinite(values))[0]])
+            raise ValueError(f"must give finite values of {name}, but gives a NaN or infinity at {at_s:g} s.")
+        out[name] = values
+    if "left_mm" in out and "right_mm" in out:
+        out.pop("gap_mm", None)
+        return out
+    if "gap_mm" not in out:
+        said = ", ".join(str(name) for name in answer) or "nothing"
+        raise ValueError(f"must give gap_mm, or left_mm and right_mm, but gives {said}.")
+    gap_mm = out.pop("gap_mm")
+    return {"left_mm": -0.5 * gap_mm, "right_mm": 0.5 * gap_mm} | {
+        name: out[name] for name in ("force_n",) if name in out
+    }

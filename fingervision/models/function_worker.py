@@ -2,7 +2,6 @@
 
 import json
 import sys
-from collections.abc import Callable, Mapping
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -11,10 +10,7 @@ import numpy as np
 
 from fingervision.domain.effect import Array
 from fingervision.models.fmu import fmu_function
-from fingervision.models.function_model import FUNCTION, SAYS
-
-Answer = Mapping[str, Array]
-Function = Callable[[Array, Array], Answer]
+from fingervision.models.function_model import FUNCTION, SAYS, Answer, Function, answer_of, points_of
 
 
 def main(arguments: list[str]) -> int:
@@ -25,7 +21,7 @@ def main(arguments: list[str]) -> int:
         out: dict[str, Any] = {}
         with np.load(asked) as runs:
             for k in range(len(runs.files) // 2):
-                for name, values in _points(function(runs[f"time{k}"], runs[f"input{k}"]), runs[f"time{k}"]).items():
+                for name, values in points_of(function(runs[f"time{k}"], runs[f"input{k}"]), runs[f"time{k}"]).items():
                     out[f"{name}{k}"] = values
         np.savez(answered, **out)
     except ValueError as error:
@@ -53,42 +49,11 @@ def _python_function(path: Path) -> Function:
 
     def function(time_s: Array, input_mm: Array) -> Answer:
         try:
-            found = simulate(time_s.copy(), input_mm.copy())
+            return answer_of(simulate, time_s, input_mm)
         except (Exception, SystemExit) as error:
             raise ValueError(f"failed in simulate: {type(error).__name__}: {error}") from error
-        return found if isinstance(found, Mapping) else {"gap_mm": found}
 
     return function
-
-
-def _points(answer: Answer, time_s: Array) -> dict[str, Array]:
-    """Convert a model's return value to left, right and force; refuse a value without one finite number per time."""
-    out: dict[str, Array] = {}
-    for name in ("gap_mm", "left_mm", "right_mm", "force_n"):
-        if name not in answer:
-            continue
-        try:
-            values = np.asarray(answer[name], dtype=np.float64)
-        except (TypeError, ValueError):
-            raise ValueError(f"must give numbers for {name}, but gives {type(answer[name]).__name__}.") from None
-        if values.shape != time_s.shape:
-            raise ValueError(
-                f"must give {time_s.size} values of {name}, one for each time, but gives shape {values.shape}."
-            )
-        if not np.all(np.isfinite(values)):
-            at_s = float(time_s[np.flatnonzero(~np.isfinite(values))[0]])
-            raise ValueError(f"must give finite values of {name}, but gives a NaN or infinity at {at_s:g} s.")
-        out[name] = values
-    if "left_mm" in out and "right_mm" in out:
-        out.pop("gap_mm", None)
-        return out
-    if "gap_mm" not in out:
-        said = ", ".join(str(name) for name in answer) or "nothing"
-        raise ValueError(f"must give gap_mm, or left_mm and right_mm, but gives {said}.")
-    gap_mm = out.pop("gap_mm")
-    return {"left_mm": -0.5 * gap_mm, "right_mm": 0.5 * gap_mm} | {
-        name: out[name] for name in ("force_n",) if name in out
-    }
 
 
 if __name__ == "__main__":

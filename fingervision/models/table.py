@@ -6,11 +6,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.short_repr import ShortRepr
 from fingervision.domain.response import Response
 
 
-@dataclass(frozen=True, eq=False)
-class TableModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class TableModel(ShortRepr):
     """A table from Comsol, MATLAB, Ansys or any other source that gives the gap at some inputs.
 
     Parameters

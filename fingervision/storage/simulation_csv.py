@@ -31,6 +31,7 @@ def write_simulation(
     input_mm: NDArray[np.float64],
     response: Response,
     bodies: Mapping[str, NDArray[np.float64]] = MappingProxyType({}),
+    comment: str = "",
 ) -> None:
     """Write a simulation table with one row per input.
 
@@ -44,6 +45,8 @@ def write_simulation(
         Response of the model to these inputs.
     bodies : mapping of str to ndarray of float, shape (n, 3)
         Poses of the bodies, written as the last columns of the table.
+    comment : str
+        First line of the file, if there is something to say.
     """
     columns = {
         "input_mm": input_mm,
@@ -55,6 +58,7 @@ def write_simulation(
         columns["force_n"] = response.force_n
     columns |= pose_columns(bodies)
     with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# {comment}\n" if comment else "")
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         for row in zip(*columns.values(), strict=True):
