@@ -1,7 +1,7 @@
 """Pictures in memory as a recording: numpy arrays of any bit depth, grey or colour, all at once or one by one."""
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
@@ -133,7 +133,7 @@ class PictureStream:
 
     def __post_init__(self) -> None:
         _check_rate(self.rate_hz, self.times_s)
-        count = len(self.pictures) if hasattr(self.pictures, "__len__") else None
+        count = len(self.pictures) if isinstance(self.pictures, Sized) else None
         if self.times_s is not None:
             self.times_s = _checked_times(self.times_s, len(self.times_s) if count is None else count)
         rest = iter(self.pictures)
@@ -198,13 +198,13 @@ class PictureStream:
         return self.times_s[index]
 
 
-def _single(picture: object, index: int) -> NDArray[np.generic]:
+def _single(picture: Any, index: int) -> NDArray[np.generic]:
     """Check that something that was yielded is one picture, of shape (height, width) or (height, width, colours)."""
     stack = stated_shape(picture, "source" if index == 0 else f"source, picture {index},")
-    if len(stack) > 1 or np.ndim(picture) > 3:  # type: ignore[arg-type]
+    if len(stack) > 1 or picture.ndim > 3:
         must = f"yield pictures of shape (height, width) or (height, width, {' or '.join(map(str, COLOURS))})"
-        raise ArgumentError("source", must, f"picture {index} has shape {np.shape(picture)}")  # type: ignore[arg-type]
-    return stack[0]
+        raise ArgumentError("source", must, f"picture {index} has shape {picture.shape}")
+    return picture if picture.ndim == 2 else np.asarray(picture.reshape(stack.shape[1:]))
 
 
 def _check_rate(rate_hz: float | None, times_s: Sequence[float] | None) -> None:
