@@ -95,17 +95,22 @@ class SourceCamera:
             self._changed.notify()
 
 
+def stated_timing(section: Section) -> tuple[Latency, float, float | None]:
+    """Read the latency, the patience (s) and the frame rate (Hz) of a live camera."""
+    latency = Latency(
+        section.number("latency_s", LATENCY_S, low=0.0), section.number("u_latency_s", U_LATENCY_S, low=0.0)
+    )
+    rate_hz = section.number("rate_hz", above=0.0) if "rate_hz" in section.values else None
+    return latency, section.number("patience_s", PATIENCE_S, above=0.0), rate_hz
+
+
 def build(section: Section, context: BuildContext) -> SourceCamera:
     """Open the source of frames that a section of the configuration states."""
     name = section.word("source")
     size = None
     if "width_px" in section.values or "height_px" in section.values:
         size = section.whole("width_px", low=16, high=16384), section.whole("height_px", low=16, high=16384)
-    rate_hz = section.number("rate_hz", above=0.0) if "rate_hz" in section.values else None
-    latency = Latency(
-        section.number("latency_s", LATENCY_S, low=0.0), section.number("u_latency_s", U_LATENCY_S, low=0.0)
-    )
-    patience_s = section.number("patience_s", PATIENCE_S, above=0.0)
+    latency, patience_s, rate_hz = stated_timing(section)
     source = open_source(name, Wish(rate_hz=rate_hz, size_px=size))
     if not hasattr(source, "received"):
         section.refuse("source", f"must be a camera or a stream, but {name} is a recording: name a live source.")

@@ -6,15 +6,19 @@ from pathlib import Path
 from typing import Any
 
 from tests.testbed.stages import emulators
+from tests.testbed.stages.motor_record import MotorRecordServer
 
-LIMITS = "lower_mm = -2\nupper_mm = 8\nspeed_mm_s = 5\naccuracy_mm = 0.002\nsettling_s = 0.2\n"
+LIMITS = "lower_mm = -2\nupper_mm = 8\nspeed_mm_s = 5\naccuracy_mm = 0.002\n"
 CAMERA = """
 [camera]
 kind = "simulated"
 rate_hz = 100.0
+width_px = 320
+height_px = 120
+px_per_mm = 17.0
 [gripper]
 [scale]
-px_per_mm = 34.0
+px_per_mm = 17.0
 """
 
 
@@ -25,12 +29,15 @@ class Case:
     make: Callable[[], Any]
     lines: str
     library: str = ""
+    settling_s: float = 0.2
 
-    def bed_at(self, folder: Path, emulator: Any, camera: str = "", limits: str = LIMITS) -> Path:
+    def bed_at(self, folder: Path, emulator: Any, camera: str = "") -> Path:
         path = folder / "bed.toml"
+        (folder / "demo.cfg").write_text(DEMO, encoding="utf-8")
         actuator = self.lines.replace("PORT", emulator.port)
         path.write_text(
-            f"schema = 1\n[actuator]\n{actuator}\n{limits}[limits]\nlower_mm = -0.4\nupper_mm = 6\n{camera}",
+            f"schema = 1\n[actuator]\n{actuator}\n{LIMITS}settling_s = {self.settling_s}\n"
+            f"[limits]\nlower_mm = -0.4\nupper_mm = 6\n{camera}",
             encoding="utf-8",
         )
         return path
@@ -40,6 +47,34 @@ def text(words: str, more: str = "") -> str:
     return f'kind = "serial_text"\nwords = "{words}"\nport = "PORT"\n{more}'
 
 
+class Library:
+    """A stage that a library simulates in this process; there is no cable to pull."""
+
+    port = ""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class Demo(Library):
+    """The demo devices of Micro-Manager."""
+
+    def __init__(self) -> None:
+        import mm_test_adapters
+
+        self.port = mm_test_adapters.device_adapter_path()
+
+
+MICROMANAGER = 'kind = "micromanager"\nfolder = "PORT"\nconfiguration = "demo.cfg"\n'
+DEMO = """
+Device,Stage,NotificationTester,NTAsyncStage
+Device,XY,DemoCamera,DXYStage
+Device,Cam,DemoCamera,DCam
+Property,Core,Initialize,1
+Property,Stage,UmPerStep,1.0
+Property,Stage,SlewTimePerStep_s,0.0001
+Property,Stage,UpdateInterval_s,0.01
+"""
 CASES: dict[str, Case] = {
     "grbl": Case(emulators.Grbl, text("grbl")),
     "marlin": Case(emulators.Marlin, text("marlin", f"set = {{ steps_per_mm = {emulators.STEPS_PER_MM} }}\n")),
@@ -50,5 +85,29 @@ CASES: dict[str, Case] = {
     "kinesis": Case(
         emulators.Kinesis,
         f'kind = "kinesis"\nport = "PORT"\ncontroller = "dc_servo"\ncounts_per_mm = {emulators.COUNTS_PER_MM}\n',
+    ),
+    # The simulated record moves in ticks of 50 ms, each a little late.
+    "epics_motor": Case(MotorRecordServer, 'kind = "epics_motor"\nrecord = "PORT"\n', "caproto", settling_s=0.8),
+    "ophyd_epics": Case(
+        MotorRecordServer,
+        'kind = "ophyd"\ndevice = "ophyd:EpicsMotor"\narguments = ["PORT"]\nnamed = { name = "stage" }\n',
+        "ophyd",
+        settling_s=0.8,
+    ),
+    "ophyd_ramp": Case(
+        Library, 'kind = "ophyd"\ndevice = "ophyd.sim:SynAxis"\nnamed = { name = "stage" }\nspeed = ""\n', "ophyd"
+    ),
+    # This motor accelerates for half a second.
+    "ophyd_async": Case(
+        Library,
+        'kind = "ophyd"\ndevice = "ophyd_async.sim:SimMotor"\nnamed = { name = "stage", instant = false }\n',
+        "ophyd_async",
+        settling_s=1.0,
+    ),
+    "micromanager": Case(Demo, f'{MICROMANAGER}device = "Stage"\n', "mm_test_adapters"),
+    "micromanager_xy": Case(
+        Demo,
+        f'{MICROMANAGER}device = "XY"\naxis = "y"\nspeed_property = "Velocity"\nspeed_per_mm_s = 1\n',
+        "mm_test_adapters",
     ),
 }

@@ -28,7 +28,7 @@ from tests.testbed.stages.stage_cases import CAMERA, CASES, Case
 # pyserial does not close the socket of a `socket://` port whose other end has closed it.
 pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
 PATIENCE_S = 60.0
-# 300 frames at 100 Hz: a slow triangle and a hold.
+# At least 300 frames, however slow the computer is: a triangle, and ten points with thirty frames each.
 RECIPE = """
 schema = 1
 name = "three hundred frames"
@@ -36,19 +36,24 @@ name = "three hundred frames"
 kind = "triangle"
 from_mm = 0.0
 to_mm = 0.5
-speed_mm_s = 0.4
+speed_mm_s = 1.0
 [[step]]
-kind = "hold"
-at_mm = 0.2
-seconds = 0.6
+kind = "staircase"
+from_mm = 0.0
+to_mm = 0.45
+steps = 9
+dwell_s = 0.0
+speed_mm_s = 2.0
+frames = 30
 """
 
 
 @pytest.fixture(params=sorted(CASES))
 def case(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Case:
     found = CASES[request.param]
-    if found.library:
+    if found.library and found.library.partition(".")[0] not in sys.modules:
         pytest.importorskip(found.library, reason=f"{found.library} is not installed")
+    monkeypatch.setenv("OPHYD_CONTROL_LAYER", "caproto")
     # The emulators are ready at once, unlike a board that restarts when its port is opened.
     monkeypatch.setattr("fingervision.testbed.text_protocol.line.sleep", lambda seconds: None)
     return found
@@ -69,6 +74,11 @@ def bed(case: Case, device: Any, tmp_path: Path) -> Iterator[Bed]:
     opened.close()
 
 
+def has_a_cable(device: Any) -> None:
+    if not hasattr(device, "unplug"):
+        pytest.skip("this stage is in the program itself")
+
+
 def recipe_at(folder: Path) -> Path:
     path = folder / "recipe.toml"
     path.write_text(RECIPE, encoding="utf-8")
@@ -85,7 +95,7 @@ def test_the_stage_keeps_the_contract(case: Case, device: Any, tmp_path: Path) -
     assert run(ActuatorContract, open_bed=lambda: open_bed(path)) == {}
 
 
-def test_a_stop_in_motion_stops_the_stage_while_it_is_asked(device: Any, bed: Bed) -> None:
+def test_a_stop_in_motion_stops_the_stage_while_it_is_asked(bed: Bed) -> None:
     bed.actuator.move(5.0, 2.0)
     asking = threading.Thread(target=lambda: [bed.actuator.readings() for _ in range(100)])
     asking.start()
@@ -96,23 +106,26 @@ def test_a_stop_in_motion_stops_the_stage_while_it_is_asked(device: Any, bed: Be
     while bed.actuator.busy and time.monotonic() < until_s:
         time.sleep(0.01)
     at_mm = bed.actuator.readings()[-1].value
-    assert 0.1 < at_mm < 2.0
-    assert not device.plant.moves
+    assert 0.0 < at_mm < 3.0
+    time.sleep(0.15)
+    assert bed.actuator.readings()[-1].value == pytest.approx(at_mm, abs=0.002)
     assert bed.actuator.alarm is None
     bed.actuator.move(at_mm + 0.02, 1.0)  # the next motion is accepted
 
 
-def test_beyond_the_limits_nothing_is_sent(device: Any, bed: Bed) -> None:
-    heard = len(device.heard)
+def test_beyond_the_limits_nothing_moves(bed: Bed) -> None:
+    before_mm = bed.actuator.readings()[-1].value
     for to_mm, mm_s in ((8.1, 1.0), (-2.1, 1.0), (1.0, 5.1)):
         with pytest.raises(LimitError, match="nothing was moved"):
             bed.actuator.move(to_mm, mm_s)
-    assert len(device.heard) == heard
+    assert not bed.actuator.busy
+    assert bed.actuator.readings()[-1].value == pytest.approx(before_mm, abs=0.002)
 
 
 def test_an_unplugged_stage_is_a_sentence_and_works_when_it_is_back(
     case: Case, device: Any, bed: Bed, tmp_path: Path
 ) -> None:
+    has_a_cable(device)
     bed.actuator.move(1.0, 1.0)
     device.unplug()
     with pytest.raises(DeviceError, match=r"must .*(cable|emergency stop)"):
@@ -138,7 +151,7 @@ def test_nonsense_and_silence_are_sentences(device: Any, bed: Bed, fault: str) -
 
 
 def test_lost_steps_are_an_alarm_until_the_stage_is_homed(device: Any, bed: Bed) -> None:
-    if not hasattr(device.plant, "lost_mm"):
+    if not hasattr(device, "plant"):
         pytest.skip("what is emulated is not ours, and loses no steps")
     device.plant.lost_mm = -0.05
     with pytest.raises(DeviceError, match=r"sent to 0\.3 mm and rests at 0\.25 mm"):
@@ -152,10 +165,11 @@ def test_lost_steps_are_an_alarm_until_the_stage_is_homed(device: Any, bed: Bed)
 
 @pytest.mark.slow
 def test_a_run_that_is_unplugged_loses_nothing_and_goes_on(case: Case, device: Any, tmp_path: Path) -> None:
+    has_a_cable(device)
     path, out = str(case.bed_at(tmp_path, device, CAMERA)), tmp_path / "run"
     recipe = read_recipe(recipe_at(tmp_path))
     bed = open_bed(path)
-    pulled = threading.Thread(target=lambda: _when(lambda: frames_in(out / "video.mp4") > 100, device.unplug))
+    pulled = threading.Thread(target=lambda: _when(lambda: frames_in(out / "video.mp4") > 50, device.unplug))
     pulled.start()
     with pytest.raises(FingervisionError, match=r"cable|emergency stop"):
         run_recipe(recipe, bed, out)
@@ -188,10 +202,9 @@ def test_a_run_that_is_killed_goes_on_after_the_same_bytes(case: Case, device: A
         str(out),
     ]
     process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _when(lambda: frames_in(out / "video.mp4") > 100 or process.poll() is not None, lambda: None)
+    _when(lambda: frames_in(out / "video.mp4") > 50 or process.poll() is not None, lambda: None)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    _when(lambda: not device.plant.moves, lambda: None)
     before, rows = (out / "samples.csv").read_bytes(), read_samples(out / "samples.csv")
     in_video = frames_in(out / "video.mp4")
     assert in_video - len(rows) <= 100  # a second
@@ -202,7 +215,7 @@ def test_a_run_that_is_killed_goes_on_after_the_same_bytes(case: Case, device: A
     whole = before[: before.rfind(b"\n") + 1].splitlines(keepends=True)[: done.resumed_after + 1]
     assert (out / "samples.csv").read_bytes().startswith(b"".join(whole))
     rows = read_samples(out / "samples.csv")
-    assert len(rows) == frames_in(out / "video.mp4") >= 250
+    assert len(rows) == frames_in(out / "video.mp4") >= 300
     at_mm = [row.input_mm for row in rows if row.input_mm is not None]
     assert max(at_mm) == pytest.approx(0.5, abs=0.005)
     assert json.loads((out / "run.json").read_text())["complete"]
