@@ -8,7 +8,7 @@ import numpy as np
 from fingervision.diagnosis.bodies.body_evidence import body_evidence, drawing_of
 from fingervision.diagnosis.bodies.place_diagnosis import without_places
 from fingervision.diagnosis.bodies.place_words import body_places
-from fingervision.diagnosis.inference.cross_validation import rms_mm
+from fingervision.diagnosis.inference.held_out_prediction import rms_mm
 from fingervision.diagnosis.inference.plausibility import mistaken_column
 from fingervision.diagnosis.inference.verdict import isolated
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation

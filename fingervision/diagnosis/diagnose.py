@@ -9,6 +9,7 @@ from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_diagnosis import diagnose_with_bodies, without_places
 from fingervision.diagnosis.inference.answer import judged, without_names
 from fingervision.diagnosis.inference.explanation_candidates import Progress
+from fingervision.diagnosis.inference.held_out_prediction import foretold
 from fingervision.diagnosis.inference.plausibility import mistaken_column, mixed_rows, swapped_directions
 from fingervision.diagnosis.inference.refitted_search import Refitted, refitted_search
 from fingervision.diagnosis.input.observations import Observations
@@ -136,8 +137,8 @@ def _explained(
     if mistake is not None and mistake.blocks:
         data, found = without_names(data, found, mistake.words.rstrip("."))
         found = replace(found, left_over=None)
-    answered = judged(data, found)
-    report = diagnosis_report(answered, refitted.posterior, mistake, rng, begin_s)
+    answered = judged(data, found if forced else foretold(data, found))
+    report = diagnosis_report(answered, refitted.posterior, mistake, forced, rng, begin_s)
     progress(1.0)
     positioning = positioning_of_data(answered.data, answered.values())
     return Diagnosis(

@@ -128,6 +128,8 @@ class DiagnosisReport(ShortRepr):
     `explained_share` is 1 - (after / before)^2 and `standing_share` is after / before, where `before` and `after` are
     the counted RMS of the disagreement: without outliers and the scatter between runs. `pure_error_mm` is the standard
     deviation of replicates of the gap, None without replicates. `outlier_rows` describes each row set aside in the fit.
+    `runners_up` lists single effects, each with the share of the disagreement that it explains alone. `next_step` says
+    what to do next, whatever the verdict.
     """
 
     verdict: Verdict
@@ -149,3 +151,4 @@ class DiagnosisReport(ShortRepr):
     runners_up: tuple[Mapping[str, object], ...]
     notes: tuple[str, ...]
     seconds: float
+    next_step: str = ""

@@ -110,8 +110,8 @@ class Diagnosis:
         lines = [f"{report.verdict}: {report.sentence}"]
         lines += [f"  {line}" for line in detail_lines(report.verdict, report.effects, report.alternatives)]
         lines += [f"  note: {words}" for words in (*report.outliers, *report.notes)]
-        if report.next_run is not None:
-            lines.append(f"  next: {report.next_run.words}")
+        if report.next_run is not None or report.verdict is Verdict.UNKNOWN:
+            lines.append(f"  next: {report.next_step}")
         return "\n".join(lines)
 
     def save(self, folder: "str | os.PathLike[str]") -> Path:

@@ -23,8 +23,11 @@ MOST_TARGETS = 200
 """Largest number of targets: ISO 230-2 requires 5 per metre; with 200, five cycles have 2000 rests. More positions are
 samples of a motion, or steps of an encoder."""
 SHORTEST_REST_S = 0.3
-"""Median time between visits below which the stage was in motion: a stage takes a few tenths of a second to move,
-arrive and stop, and ISO 230-2 requires readings at rest."""
+"""Median time between visits of several rows each, below which the stage was in motion: a stage takes a few tenths of a
+second to move, arrive and stop, and ISO 230-2 requires readings at rest."""
+SHORTEST_SINGLE_S = 1.0
+"""The same for visits of a single row, in which the stage is not seen to stand: at this rate a logger records a
+motion."""
 SETTLING_ROWS = 4
 """Least number of rows in a visit of which the first half is left out as settling."""
 LEAST_SHARE = 0.5
@@ -110,7 +113,8 @@ def repeated_targets(
     visits = [visit for run in runs for visit in _visits(input_mm, measured, run, centres, halfwidth)]
     if time_s is not None:
         between = _seconds_between(visits, time_s, runs)
-        if between is not None and between < SHORTEST_REST_S:
+        several = bool(visits) and float(np.median([len(visit.places) for visit in visits])) > 1.0
+        if between is not None and between < (SHORTEST_REST_S if several else SHORTEST_SINGLE_S):
             return NoRepeatedTargets(
                 f"the input changes every {between:.2g} s, so readings were taken in motion and not at rest"
             )

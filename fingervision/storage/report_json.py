@@ -44,6 +44,7 @@ def report_document(report: DiagnosisReport, model_path: str | None, recipe_path
             "separates": list(run.separates),
             "words": run.words,
         },
+        "next_step": report.next_step,
         "excluded": list(report.excluded),
         "outliers": list(report.outliers),
         "outlier_rows": [dict(row) for row in report.outlier_rows],

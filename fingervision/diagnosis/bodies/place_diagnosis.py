@@ -17,6 +17,7 @@ from fingervision.diagnosis.bodies.body_evidence import (
 from fingervision.diagnosis.bodies.body_prediction import FORCE, known_channels
 from fingervision.diagnosis.bodies.composed_report import composed, measured_bodies
 from fingervision.diagnosis.bodies.place_words import body_places
+from fingervision.diagnosis.design.next_look import CHECK
 from fingervision.diagnosis.inference.verdict import STANDING_SHARE
 from fingervision.domain.effect import DriveEffect, split_key
 from fingervision.domain.errors import DataError
@@ -109,6 +110,7 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
         alternatives=(),
         unknown=None,
         next_run=None,
+        next_step=CHECK,
         disagreement=replace(
             d,
             after_rms_mm=d.before_rms_mm,

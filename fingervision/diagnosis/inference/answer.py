@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from fingervision.diagnosis.inference.cross_validation import rms_mm
+from fingervision.diagnosis.inference.held_out_prediction import rms_mm
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.search_state import Findings

@@ -118,7 +118,7 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
             top = int(np.argmax(gain))
             taken = np.hstack([taken, columns[:, top : top + 1]])
             added.append(shapes.before_whitening(top))
-            words.append(f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)")
+            words.append(shapes.words[top])
             cost += each - float(gain[top])
             if cost < least and not _differs_by_rounding(problem, found, base, np.stack(added, axis=1)):
                 least, best = cost, " and ".join(words)
@@ -235,9 +235,9 @@ def remaining_structure(
         threshold = max(threshold, _of_jumps_astray(problem, shapes.columns, best, rng))
     if gain[top] <= threshold:
         return None, own.words if own.gain > threshold else None
-    words = f"{shapes.words[top]} ({np.sqrt(gain[top]):.1f} sigma)"
-    coefficient = float(dot[top]) / float(norm[top])
-    if below_the_input(problem, _size_in_runs(problem, coefficient * shapes.before_whitening(top))):
+    size_mm = _size_in_runs(problem, float(dot[top]) / float(norm[top]) * shapes.before_whitening(top))
+    words = f"{shapes.words[top]} ({1e3 * size_mm:.2g} um RMS)"
+    if below_the_input(problem, size_mm):
         return None, words
     # A small part of the explained change is attributed to the inexactness of an effect's formula, or of a map between
     # its nodes.

@@ -1,6 +1,6 @@
 """Search with a random effect added: gains that differ from run to run, or a map of position errors."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -82,10 +82,11 @@ def beside_map(state: Searched, look: Look) -> Searched:
     asked = NAME in look.forced
     if reason is not None:
         excluded = {**state.data.excluded, NAME: reason}
-        return replace(state, data=replace(state.data, excluded=excluded))
+        return _contested(replace(state, data=replace(state.data, excluded=excluded)), reason)
     known: Explanation | None = found.best
     if not asked and found.unknown is None:
-        likelier = _likelier(found, likeliest_map, LEAST_GAIN)
+        stands = not standing_of(state.data, found).is_noise
+        likelier = _likelier(found, likeliest_map, LEAST_GAIN, _acting_in_time(found) if stands else ())
         if likelier is None:
             return state
         known, first = likelier
@@ -96,7 +97,8 @@ def beside_map(state: Searched, look: Look) -> Searched:
             first, gain = likeliest_map(found.problem, found.nothing)
         if gain < LEAST_GAIN and not asked:
             return state
-    imitating = imitating_effects(found.problem, first)
+    # What the user requires stays beside the map, even if the map could represent it.
+    imitating = {n: why for n, why in imitating_effects(found.problem, first).items() if n not in look.forced}
     kept = known if known is not None and not set(known.names) & set(imitating) else None
     beside = look.again(_excluding(replace(state.data, position_map=first), imitating), kept)
     plain = _without(beside.found.problem, first)
@@ -129,6 +131,28 @@ def beside_map(state: Searched, look: Look) -> Searched:
     return beside if not (stays or worse) and _gained(state, beside, second) > LEAST_GAIN else state
 
 
+def _contested(state: Searched, reason: str) -> Searched:
+    """Name nothing if an unknown curve over the input is far more probable than the names, which leave more than noise.
+
+    Such a curve has no name where the table does not show whether it is repeatable, but it may be the cause. For
+    example, a drive that sags under gravity, driven one way for six seconds, was taken for a creep of 16 s.
+    """
+    found = state.found
+    if found.unknown is not None or not found.best.names or standing_of(state.data, found).is_noise:
+        return state
+    likelier = _likelier(found, likeliest_map, LEAST_GAIN, _acting_in_time(found))
+    if likelier is None:
+        return state
+    known, curve = likelier
+    beside = "" if known is None else f" beside {' and '.join(known.names)}"
+    words = (
+        f"a curve over the input of {1e3 * curve.rms_mm.value:.2g} um RMS{beside} is far more probable than "
+        f"{' and '.join(found.best.names)}, but {reason}"
+    )
+    nothing = found.problem.nothing()
+    return replace(state, found=replace(found, best=nothing, alternatives=(), unknown=words))
+
+
 def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:
     gap_mm = float(np.sqrt(np.mean(repeated.fitted_mm[: problem.chain.history.input_mm.size] ** 2)))
     rms_um, sigma_um = 1e3 * gap_mm / mean_slope(problem), 1e3 * problem.chain.history.input_sigma_mm
@@ -139,19 +163,23 @@ def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:
 
 
 def _likelier(
-    found: Findings, estimated: Callable[[Problem, Explanation], tuple[Effected, float]], least: float
+    found: Findings,
+    estimated: Callable[[Problem, Explanation], tuple[Effected, float]],
+    least: float,
+    others: Sequence[Explanation] = (),
 ) -> tuple[Explanation | None, Effected] | None:
     """Find few effects plus a random effect that gain `least` over the present best explanation, or return None.
 
     Two or three effects can imitate a random effect, such as a map measured from one side only, or runs of different
-    gain.
+    gain. `others` are further explanations with which the random effect is tried.
     """
     problem = found.problem
     rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
     singles = different(problem, list(found.singles), BESIDE)
     tried = []
     begins = (found.nothing, _line(problem), *singles, *([found.best] if least > 0.0 else []))
-    for begin in {e.names: e for e in begins if len(e.names) <= len(found.best.names)}.values():
+    fewer = [e for e in begins if len(e.names) <= len(found.best.names)]
+    for begin in {e.names: e for e in (*others, *fewer)}.values():
         known, (effect, _) = begin, estimated(problem, begin)
         for _ in range(ROUNDS):
             # Refit the effects, because the random effect now explains what they imitated.
@@ -166,13 +194,23 @@ def _likelier(
     return (known if known.names else None), effect
 
 
-def _line(problem: Problem) -> Explanation:
+def _line(problem: Problem, beside: Explanation | None = None) -> Explanation:
     """Fit a straight line over the input, as an offset of the gap and a ratio if both effects can be named.
 
-    A map of position errors contains no straight line.
+    A map of position errors contains no straight line. The line may be fitted beside an effect.
     """
     names = tuple(name for name in ("rest_gap_error", "lever_ratio_error") if name in problem.effects)
-    return fit(problem, names, {name: {} for name in names}, iterations=5) if names else problem.nothing()
+    begin = {**({} if beside is None else beside.values), **{name: {} for name in names}}
+    return fit(problem, tuple(begin), begin, iterations=5) if begin else problem.nothing()
+
+
+def _acting_in_time(found: Findings) -> list[Explanation]:
+    """Each effect with memory beside a straight line: a map together with a loop or a lag is the rule for a stage.
+
+    Alone, such an effect fits badly, and is not among the most probable ones, if the map is the larger part.
+    """
+    problem = found.problem
+    return [_line(problem, e) for e in found.singles if problem.effects[e.names[0]].memory]
 
 
 def _beside(problem: Problem, effect: RunGains | PositionMap) -> Problem:

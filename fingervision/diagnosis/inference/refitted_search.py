@@ -86,7 +86,7 @@ def refitted_search(
     if NAME not in without:
         state = _at_the_ends(beside_map(state, look), within, look)
     state = _common_offset(state, look)
-    return _settled(_beside_drawing(state, look), rng)
+    return _settled(_beside_drawing(state, look), look)
 
 
 def _over_the_ends(state: Searched, look: Look) -> Searched:
@@ -168,11 +168,12 @@ def _beside_drawing(state: Searched, look: Look) -> Searched:
     return refitted(state)
 
 
-def _settled(state: Searched, rng: np.random.Generator) -> Refitted:
+def _settled(state: Searched, look: Look) -> Refitted:
     """Drop unneeded effects, estimate the map and the gains, and compute every parameter's posterior."""
-    data, found = state.data, without_unneeded_effects(state.data, state.found)
-    found = with_simpler_parts(data, without_fits_to_structure(data, found))
-    best, posterior = settled_with_records(data, found.problem, found.best, rng)
+    data, found = state.data, state.found
+    if not look.forced & set(found.best.names):
+        found = with_simpler_parts(data, without_fits_to_structure(data, without_unneeded_effects(data, found)))
+    best, posterior = settled_with_records(data, found.problem, found.best, look.rng)
     found = found.with_best(best)
     if data.position_map is not None:
         data = replace(

@@ -210,7 +210,7 @@ def _findings(state: SearchState, forced: frozenset[str]) -> Findings:
     alternatives.sort(key=lambda e: e is not best)
     if state.unknown is not None:
         stands = max(0.0, best.score - state.values)
-        if nothing.score - best.score < PART_OF_UNKNOWN * stands:
+        if nothing.score - best.score < PART_OF_UNKNOWN * stands and not forced & set(best.names):
             best = nothing
         alternatives = [best] if best.names else []
     smallest = (

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.stats import binomtest
 
 from fingervision.diagnosis.design.further_evidence import further_evidence
+from fingervision.diagnosis.design.next_look import next_look
 from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.answer import Answer
-from fingervision.diagnosis.inference.cross_validation import left_out_rms_mm, rms_mm
+from fingervision.diagnosis.inference.held_out_prediction import left_out_rms_mm, rms_mm
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
@@ -27,7 +28,9 @@ from fingervision.diagnosis.report.sentences import (
     beyond_the_search,
     input_dominates,
     remaining,
+    required_words,
     rows_beyond_model,
+    tried,
 )
 from fingervision.domain.effect import Array, History
 from fingervision.domain.model import PhysicalModel
@@ -232,12 +235,19 @@ MEMBERS_SEPARATED = 5
 """Number of explanations, best first, that the next run is designed to separate; the computing time grows with its
 square."""
 
+LOOKED_AT = 1
+"""Seed for the regions of the remaining residual, so that the draws for the next run stay those of the diagnosis."""
 RUNNERS_UP = 8
 """Number of single effects, best first, that a report lists in addition to its result."""
 
 
 def diagnosis_report(
-    answered: Answer, posterior: tuple[Point, ...], mistake: Finding | None, rng: np.random.Generator, begin_s: float
+    answered: Answer,
+    posterior: tuple[Point, ...],
+    mistake: Finding | None,
+    forced: frozenset[str],
+    rng: np.random.Generator,
+    begin_s: float,
 ) -> DiagnosisReport:
     """Compose the report of a result, with its evidence and the next run.
 
@@ -249,6 +259,8 @@ def diagnosis_report(
         Posterior draws of the best explanation's parameters, for predicting the next run.
     mistake : Finding or None
         Mistake found in the table itself.
+    forced : frozenset of str
+        Effects that the user requires.
     rng : numpy.random.Generator
         Generator of the bootstrap.
     begin_s : float
@@ -264,9 +276,12 @@ def diagnosis_report(
     members = tuple(e for e in found.alternatives if e.names)
     alternatives = tuple(_with_map(e.names, mapped=mapped) for e in members) or (((NAME,),) if mapped else ())
     proposal = next_run(data, found.problem, list(members[:MEMBERS_SEPARATED]), posterior, rng)
+    mistaken = mistake is not None and mistake.blocks
+    left = places(data, found.problem, answered.after_mm, np.random.default_rng(LOOKED_AT))
+    runners_up = _runners_up(found)
     return DiagnosisReport(
         verdict=decided,
-        sentence=answer(decided, unknown, effects, alternatives, disagreement),
+        sentence=answer(decided, unknown, effects, alternatives, disagreement, mistaken=mistaken),
         effects=effects,
         alternatives=alternatives,
         where=places(data, found.problem, answered.before_mm, rng),
@@ -281,16 +296,10 @@ def diagnosis_report(
         excluded=tuple({"name": name, "reason": reason} for name, reason in data.excluded.items()),
         outliers=outliers(data, found.problem, rows, answered.after_mm),
         outlier_rows=rows,
-        runners_up=tuple(
-            {
-                "effects": list(e.names),
-                "chi_square_more_than_best": e.score - best.score,
-                "distance": found.distances.get(e.names),
-            }
-            for e in found.singles[:RUNNERS_UP]
-            if e.names != best.names
-        ),
+        runners_up=runners_up,
         notes=(
+            *((tried(runners_up),) if decided is Verdict.UNKNOWN and not mistaken else ()),
+            *required_words(data, best, forced, mapped=mapped),
             *data.notes,
             *data.refitted(),
             *(() if mistake is None else (mistake.words,)),
@@ -304,6 +313,23 @@ def diagnosis_report(
             *dead_band_hint(data, answered.before_mm, decided),
         ),
         seconds=time.perf_counter() - begin_s,
+        next_step=next_look(data, decided, proposal, left, mistaken=mistaken),
+    )
+
+
+def _runners_up(found: Findings) -> tuple[dict[str, object], ...]:
+    """Single effects, best first, each with the share of the squared disagreement beyond noise that it explains."""
+    rows = float(found.problem.measured.size - found.problem.whitener.aside.sum())
+    stands = max(found.nothing.score - rows, 1e-300)
+    return tuple(
+        {
+            "effects": list(e.names),
+            "explained_share": float(np.clip((found.nothing.score - e.score) / stands, 0.0, 1.0)),
+            "chi_square_more_than_best": e.score - found.best.score,
+            "distance": found.distances.get(e.names),
+        }
+        for e in found.singles[:RUNNERS_UP]
+        if e.names != found.best.names
     )
 
 

@@ -28,7 +28,7 @@ from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.report_parts import added_sections
 from fingervision.diagnosis.report.residual_channels import by_channel
 from fingervision.diagnosis.report.residual_figure import residual_figure
-from fingervision.diagnosis.report.sentences import EDGES
+from fingervision.diagnosis.report.sentences import EDGES, QUESTION
 from fingervision.diagnosis.report.vector_figure import png_bytes
 from fingervision.domain.report import DiagnosisReport, Disagreement, Verdict
 from fingervision.effects import catalogue
@@ -38,8 +38,14 @@ HEADINGS = {
     Verdict.AGREES: "Measurement and model agree",
     Verdict.NAMED: "What the model lacks has a name",
     Verdict.AMBIGUOUS: "More than one explanation fits",
-    Verdict.UNKNOWN: "Something that no effect of the catalogue explains",
+    Verdict.UNKNOWN: "No effect of the catalogue explains the difference",
 }
+IN_PART = "A part of the difference has a name, the rest has none"
+UNEXPLAINED = {
+    UNDECIDED: "The table does not show its own noise",
+    QUESTION: "A question about the table comes before any name",
+}
+"""Headings of an *unknown* result by the beginning of its sentence."""
 NOWHERE = "<p>Nowhere significantly.</p>"
 SIMULATION, CORRECTED = "simulation", "corrected model"
 
@@ -96,11 +102,11 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str, measurement
         ("Difference before and after", residuals),
         ("At the turning points", frames),
         ("How much", _how_much(report)),
-        ("What was named", _mechanisms(report)),
+        ("What explains a part" if report.verdict is Verdict.UNKNOWN else "What was named", _mechanisms(report)),
         ("Parameters", table(["effect", "parameter", "value", "U (k = 2)"], parameters)),
         ("Explanations that these data cannot distinguish", _apart(report.alternatives)),
-        ("The next run", f"<p>{escape(_next_words(report))}</p>"),
-        ("Runners-up", _runners_up(report)),
+        ("The next run", f"<p>{escape(report.next_step)}</p>"),
+        ("What was tried: each effect alone", _runners_up(report)),
         ("What remains", f"<p>{escape(report.remaining)}</p>"),
         ("Set aside", bullets(list(report.outliers))),
         ("Smallest size that these data would have shown (detection limit)", _detection_limits(report)),
@@ -116,9 +122,15 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str, measurement
     positioning = positioning_html(diagnosis.positioning)
     if positioning is not None:
         sections.insert(7, ("Positioning accuracy and repeatability (ISO 230-2)", positioning))
-    undecided = report.sentence.startswith(UNDECIDED)
-    heading = "The table does not show its own noise" if undecided else HEADINGS[report.verdict]
-    return page(f"fingervision: {report.verdict}", heading, report.sentence, sections, charts)
+    return page(f"fingervision: {report.verdict}", _heading(report), report.sentence, sections, charts)
+
+
+def _heading(report: DiagnosisReport) -> str:
+    """Heading that fits verdict and sentence."""
+    for beginning, heading in UNEXPLAINED.items():
+        if report.sentence.startswith(beginning):
+            return heading
+    return IN_PART if report.verdict is Verdict.UNKNOWN and report.effects else HEADINGS[report.verdict]
 
 
 def _picture(png: bytes, words: str) -> str:
@@ -173,27 +185,18 @@ def _apart(alternatives: Sequence[Sequence[str]]) -> str:
     return bullets([" + ".join(names) for names in alternatives])
 
 
-def _next_words(report: DiagnosisReport) -> str:
-    if report.next_run is not None:
-        return report.next_run.words
-    if report.verdict is Verdict.AMBIGUOUS:
-        return (
-            "No run that the test bed can execute separates the remaining explanations; the notes list other "
-            "measurements that would, if there are any."
-        )
-    return "A next run is not needed: a single explanation remains."
-
-
 def _runners_up(report: DiagnosisReport) -> str:
     rows = [
         [
             escape(" + ".join(str(name) for name in runner["effects"])),  # type: ignore[attr-defined]
+            f"{100.0 * float(str(runner['explained_share'])):.0f} %",
             f"{runner['chi_square_more_than_best']:.1f}",
             "far" if runner["distance"] is None else f"{runner['distance']:.1f}",
         ]
         for runner in report.runners_up
     ]
-    return table(["explanation", "chi-square behind", "distance from the best explanation"], rows)
+    head = ["effect", "share that it explains alone", "chi-square behind", "distance from the best explanation"]
+    return table(head, rows)
 
 
 def _detection_limits(report: DiagnosisReport) -> str:

@@ -21,6 +21,9 @@ MOST = 8
 SMALL = 0.05
 """Significance relative to that of the first region below which a region is an artefact of the first one's
 subtraction."""
+BEYOND_DOUBT = 10.0
+"""Standard deviations above which a sentence does not state them: the tails of no noise are known so far, and the size
+in mm says more about a systematic difference."""
 NEAR = 0.85
 """Significance relative to the largest above which regions count as equally significant: the simplest of them is
 reported."""
@@ -109,9 +112,10 @@ def _words(place: Place, axis: Axis, everywhere: bool, runs: str) -> str:
     else:
         span = f"between {_rounded(place.start, axis):.3g} and {_rounded(place.end, axis):.3g} {axis.unit}"
     what = ("larger", "smaller") if place.channel in ("gap", "force") else ("farther right", "farther left")
+    doubt = f", {place.sigma:.0f} sigma" if place.sigma < BEYOND_DOUBT else ""
     return (
         f"over the {axis.name}, {span}, the {place.channel} is {abs(place.size):.3g} {place.unit} "
-        f"{what[0] if place.size > 0.0 else what[1]} than simulated, {place.sigma:.0f} sigma{runs}"
+        f"{what[0] if place.size > 0.0 else what[1]} than simulated{doubt}{runs}"
     )
 
 

@@ -1,5 +1,7 @@
 """The result as sentences: what the model lacks, what remains unexplained, which rows were excluded."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
@@ -15,6 +17,10 @@ VISIBLE = 0.1
 """Relative difference of the disagreement as the verdict counts it from that over all rows above which a sentence
 states both values; a smaller difference does not matter to a reader."""
 EDGES = " of each finger's edge"
+QUESTION = "Please check the table first"
+"""Beginning of the sentence about a mistake in the table that explains more than any effect."""
+LEAST_SHARE = 0.05
+"""Share of the squared disagreement below which an effect alone is not worth a word."""
 FEW_NAMES = 3
 """Number of explanations up to which the sentence of an ambiguous result names them; more are only counted."""
 
@@ -45,8 +51,10 @@ def answer(
     effects: tuple[NamedEffect, ...],
     alternatives: tuple[tuple[str, ...], ...],
     d: Disagreement,
+    *,
+    mistaken: bool = False,
 ) -> str:
-    """The whole result in one or two sentences.
+    """The whole result in one or two sentences; `mistaken` if a mistake in the table explains more than any effect.
 
     The sizes of several effects are stated in separate lines (`detail_lines`), so that the sentence stays short.
     """
@@ -71,8 +79,10 @@ def answer(
         return f"These data cannot distinguish {len(alternatives)} explanations{which}. With the best fit, {fall}."
     if unknown is not None and unknown.startswith(UNDECIDED):
         return f"{unknown}."
+    if mistaken:
+        return f"{QUESTION}: {unknown}."
     part = f" {what} explain{'s' if len(effects) == 1 else ''} a part; {fall}." if effects else ""
-    return f"There is structure that no effect of the catalogue explains: {unknown}.{part}"
+    return f"There is a difference that no effect of the catalogue explains: {unknown}.{part}"
 
 
 def _said(d: Disagreement) -> tuple[tuple[float, float], str]:
@@ -114,6 +124,30 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
     if max(scatter_mm, default=0.0) > 0.0:
         words += f"; the runs have offsets of {scatter_mm[0]:.2g} mm RMS in the gap"
     return words + "."
+
+
+def tried(singles: tuple[Mapping[str, object], ...]) -> str:
+    """Sentence with the share of the disagreement that each of the best single effects explains alone."""
+    shares = [
+        (" + ".join(map(str, one["effects"])), float(str(one["explained_share"])))  # type: ignore[call-overload]
+        for one in singles
+    ]
+    told = [f"{name} {100.0 * share:.0f} %" for name, share in shares if share >= LEAST_SHARE][:FEW_NAMES]
+    if not told:
+        return f"no single effect explains more than {100.0 * LEAST_SHARE:.0f} % of the squared disagreement."
+    return f"alone, of the squared disagreement {', '.join(told)} would be explained; pairs and triples were tried too."
+
+
+def required_words(data: Observations, best: Explanation, forced: frozenset[str], *, mapped: bool) -> tuple[str, ...]:
+    """Sentences on effects that the user required and that are not in the result: what speaks against each."""
+    kept = {*best.names, *(("position_error_map",) if mapped else ())}
+    beside = " beside " + " and ".join(sorted(kept)) if kept else ""
+    return tuple(
+        f"{name} was required (--with) and is not in the result: "
+        + data.excluded.get(name, f"{beside.strip() or 'without any effect'} it does not lower the disagreement")
+        + "."
+        for name in sorted(forced - kept)
+    )
 
 
 def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:

@@ -1,0 +1,63 @@
+"""A name must predict the half that it was not fitted to, and an answer always says what to do next."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fingervision.diagnosis.design.next_look import lacking, next_look
+from fingervision.diagnosis.inference.held_out_prediction import fails_on_unseen_half, left_out_rms_mm
+from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.searched import problem_of
+from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.preparation import prepare
+from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.report import Verdict
+from fingervision.models.corrected import CorrectedModel
+from fingervision.models.table import TableModel
+
+ROWS, NOISE_MM = 60, 0.002
+
+
+def observed(ratios: tuple[float, ...], seed: int = 5) -> Observations:
+    """Strokes there and back, one a run, whose gap moves by a ratio too far in each run."""
+    rng = np.random.default_rng(seed)
+    stroke = 1.0 - np.abs(np.linspace(-1.0, 1.0, ROWS))
+    u = np.tile(stroke, len(ratios))
+    gap = 3.0 + np.concatenate([(1.0 + ratio) * 5.0 * stroke for ratio in ratios])
+    runs = tuple(slice(k * ROWS, (k + 1) * ROWS) for k in range(len(ratios)))
+    time_s = 0.1 * np.arange(u.size)
+    names = tuple(str(k) for k in range(len(ratios)))
+    table = MeasuredTable(u, gap + NOISE_MM * rng.standard_normal(u.size), None, time_s, runs, names)
+    at = np.linspace(-0.5, 1.5, 5)
+    half = 0.5 * (3.0 + 5.0 * at)
+    return prepare(table, CorrectedModel("line", TableModel("line", at, -half, half), "line.csv", (-0.5, 1.5), {}))
+
+
+@pytest.mark.parametrize(
+    ("ratios", "fails"), [((0.02, 0.02), False), ((0.02,), False), ((0.02, -0.02, 0.02, -0.015), True)]
+)
+def test_a_ratio_predicts_the_runs_that_share_it(ratios: tuple[float, ...], fails: bool) -> None:
+    data = observed(ratios)
+    problem = problem_of(data, None)
+    # The second of two contrary runs is not foretold by a ratio that was fitted to the first.
+    explanation = fit(problem, ("lever_ratio_error",), {"lever_ratio_error": {"ratio": 0.015}})
+    words = fails_on_unseen_half(data, problem, explanation)
+    assert (words is not None) == fails
+    if words is not None:
+        assert words.startswith("lever_ratio_error, fitted to every other run, predicts the runs between them worse")
+    before, after = left_out_rms_mm(data, problem, explanation)
+    if len(ratios) == 1:
+        assert before is None
+    elif before is not None and after is not None and not fails:
+        assert after < 0.2 * before
+
+
+def test_there_is_always_a_next_step() -> None:
+    data = observed((0.02,))
+    assert "measure both fingers" in " ".join(lacking(data))
+    for verdict in Verdict:
+        assert len(next_look(data, verdict, None, (), mistaken=False)) > 40
+    timeless = replace(data, chain=replace(data.chain, history=replace(data.chain.history, time_s=None)))
+    assert "time_s" in next_look(timeless, Verdict.UNKNOWN, None, (), mistaken=False)
+    assert "question about the table" in next_look(data, Verdict.UNKNOWN, None, (), mistaken=True)
