@@ -64,7 +64,7 @@ def test_the_page_of_an_index_has_no_dead_link(repository: str | None, monkeypat
         assert "The first tutorial explains" in page
         return
     assert len(targets) == len(re.findall(r"\]\(([^)]*)\)", readme))
-    assert f"({repository}raw/v1.2.3/sample_frames/opening/measured.png)" in page
+    assert f"({repository}raw/v1.2.3/sample_frames/opening/idea.png)" in page
     assert f"({repository}blob/v1.2.3/CHANGELOG.md)" in page
 
 

@@ -63,7 +63,15 @@ Examples:
 Command = Callable[..., Any]
 
 
-@click.group("calibrate")
+GROUP_EXAMPLES = """
+\b
+Examples:
+  fingervision calibrate bar ref5.png=5.000 slot:ref3.png=3.000 --u-size-mm 0.0005 --plane-mm 0.2
+  fingervision calibrate check calibration.json object.png=8.000 --u-size-mm 0.001
+"""
+
+
+@click.group("calibrate", epilog=GROUP_EXAMPLES)
 def command() -> None:
     """Calibrate pixels to millimetres from a reference of known size."""
 
