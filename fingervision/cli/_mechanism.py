@@ -27,7 +27,7 @@ from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.mechanism_state import MechanismState
 from fingervision.models.mechanism_uncertainty import mechanism_uncertainty
 from fingervision.storage.mechanism_toml import read_drawing
-from fingervision.storage.simulation_csv import POSE
+from fingervision.storage.simulation_table import POSE
 
 # Tables and plots of a mechanism whose drawing lists its bodies (mechanism.toml).
 

@@ -23,7 +23,7 @@ from fingervision.models.modal_model import ModalModel
 from fingervision.models.modal_response import Motion, modal_motion
 from fingervision.models.mode_shapes import ModesWanted, mechanism_mode_shapes, parse_modes
 from fingervision.models.motion_in_time import MODES, about_equilibria, check_small_vibration, gripper_motion
-from fingervision.storage.motion_csv import write_motion
+from fingervision.storage.simulation_table import write_motion
 from fingervision.tables.read import read_drive
 
 Array = NDArray[np.float64]

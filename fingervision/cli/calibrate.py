@@ -302,7 +302,7 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
     """
     with sentences():
         from calib.gauge_study import gauge_study, refuse_moving, verdict
-        from fingervision.storage.gap_readings import read_gap_readings
+        from fingervision.storage.gaps_csv import read_gap_readings
 
         if len({table.resolve() for table in tables}) < len(tables):
             raise UsageError("Each table may be named only once, but one is named twice: leave out the second.")

@@ -134,7 +134,7 @@ def command(
     from fingervision.storage.gripper_toml import read_gripper
     from fingervision.storage.mechanism_toml import is_mechanism
     from fingervision.storage.result_owner import began_in, finish_in
-    from fingervision.storage.simulation_csv import write_simulation
+    from fingervision.storage.simulation_table import write_simulation
 
     asked = motion_asked(drive, columns, modes, frequency, damping, rate_hz, film=film)
     out = results_folder(out, gripper_toml)

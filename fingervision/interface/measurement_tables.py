@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fingervision.domain.errors import MissingLibraryError, UsageError
+from fingervision.domain.field import declared
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.status import Status
 from fingervision.interface.column_tables import measured_from_columns
 from fingervision.measuring.in_memory import MeasuredInMemory
 from fingervision.motion.clock.clock_offset import ClockOffset
-from fingervision.storage.assumed_response import response_note
-from fingervision.storage.gaps_csv import COLUMNS, FORCE_PLACES, MM_PLACES, TIME_PLACES, GapRow
-from fingervision.storage.line_file import cell
+from fingervision.storage.beside import response_note
+from fingervision.storage.gaps_csv import COLUMNS, GapRow
 from fingervision.storage.measured_table import NUMBERS
+from fingervision.storage.row_file import cell
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,9 +48,10 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
     if found.refusal is not None:
         raise found.refusal
     known = columns_of(found)
+    places = {each.name: each.field.places for each in declared(GapRow)}
     columns: dict[str, list[Any]] = {
         name: [
-            float(cell(value, _places(name))) if value is not None else None
+            float(cell(value, places[name])) if value is not None else None
             for value in (_cell(row, name) for row in found.rows)
         ]
         for name in NUMBERS
@@ -106,11 +108,6 @@ def dataset(found: MeasuredInMemory) -> "xr.Dataset":
     frames = np.array([row.frame for row in found.rows], dtype=np.int64)
     made = xr.Dataset(variables, coords={"frame": frames}, attrs={"recording": found.summary["recording"]["name"]})
     return made.set_coords("time_s")
-
-
-def _places(name: str) -> int:
-    """Decimal places of a column of gaps.csv."""
-    return {"time_s": TIME_PLACES, "force_n": FORCE_PLACES}.get(name, MM_PLACES)
 
 
 def _cell(row: GapRow, name: str) -> Any:

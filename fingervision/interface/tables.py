@@ -283,7 +283,7 @@ def own_base(model: CorrectedModel, out: Path, at_rest: Any = None) -> Corrected
     base = at_rest if is_function else model.base
     if model.base_path or not isinstance(base, TableModel):
         return model
-    from fingervision.storage.simulation_csv import write_simulation
+    from fingervision.storage.simulation_table import write_simulation
 
     path = out / "simulation.csv"
     words = f"Response at rest of the function {model.name}; its motion over time is not in this table."

@@ -23,9 +23,9 @@ from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.task import Task
+from fingervision.storage.beside import recorded_camera
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.lost_frames import lost_frames
-from fingervision.storage.recorded_camera import recorded_camera
 from fingervision.vision.pipeline import Settings, measure_frame
 
 # Determine once per recording whether the fingers are darker or lighter than the background.

@@ -10,6 +10,7 @@ from pathlib import Path
 from fingervision.domain.body_poses import OK, FramePoses, SeenPose
 from fingervision.domain.errors import DataError
 from fingervision.storage.durable import replaced
+from fingervision.storage.row_file import cell, write_table
 
 COLUMNS = (
     "frame", "time_s", "body", "status", "x_mm", "y_mm", "angle_mrad", "u_x_mm", "u_y_mm", "u_angle_mrad",
@@ -24,27 +25,27 @@ PARTS = ("x_mm", "y_mm", "angle_mrad")
 
 def write_bodies(path: Path, poses: Sequence[FramePoses]) -> None:
     """Write bodies.csv; empty cells represent missing values."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for frame in poses:
-            time_s = "" if frame.time_s is None else f"{frame.time_s:.9g}"
-            for body, pose in frame.poses.items():
-                writer.writerow([frame.frame, time_s, body, pose.status, *_cells(pose)])
+    rows = [
+        [frame.frame, frame.time_s, body, pose.status, *_values(pose)]
+        for frame in poses
+        for body, pose in frame.poses.items()
+    ]
+    write_table(path, COLUMNS, rows)
 
 
-def _cells(pose: SeenPose) -> list[str]:
+def _values(pose: SeenPose) -> list[float | None]:
     values = [pose.x_mm, pose.y_mm, pose.angle_mrad]
-    u: list[float | None] = [None, None, None]
     shared: list[float | None] = [None, None, None]
-    if pose.covariance is not None:
-        u = [float(pose.covariance[k, k]) ** 0.5 if values[k] is not None else None for k in range(3)]
-        if pose.x_mm is not None:
-            shared = [float(pose.covariance[a, b]) for a, b in ((0, 1), (0, 2), (1, 2))]
-    random: list[float | None] = [None, None, None]
-    if pose.random is not None:
-        random = [float(pose.random[k, k]) ** 0.5 if values[k] is not None else None for k in range(3)]
-    return ["" if value is None else f"{value:.9g}" for value in (*values, *u, *shared, *random)]
+    if pose.covariance is not None and pose.x_mm is not None:
+        shared = [float(pose.covariance[a, b]) for a, b in ((0, 1), (0, 2), (1, 2))]
+    u, random = (
+        [
+            None if covariance is None or value is None else float(covariance[k, k]) ** 0.5
+            for k, value in enumerate(values)
+        ]
+        for covariance in (pose.covariance, pose.random)
+    )
+    return [*values, *u, *shared, *random]
 
 
 def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, str]) -> None:
@@ -89,7 +90,7 @@ def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, st
 
 
 def _pairs(pose: SeenPose) -> list[tuple[str, ...]]:
-    cells = _cells(pose)
+    cells = [cell(value, None) for value in _values(pose)]
     return [tuple(cells[at + k] if pose.status == OK else "" for at in (0, 3, 9)) for k in range(3)]
 
 

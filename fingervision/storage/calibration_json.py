@@ -18,7 +18,7 @@ from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.plane import Plane
 from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.durable import replaced
-from fingervision.storage.finite import is_number
+from fingervision.storage.number_columns import is_number
 from fingervision.storage.plain_file import json_of
 
 # Values of a calibration file, checked one by one, and the calibration made from them.

@@ -1,14 +1,11 @@
 """User-named columns (channels) of a measured table: `name_mm`, `name_mrad`, and their `u_` and `u_random_` columns."""
 
 from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
-from fingervision.domain.errors import FingervisionError
 from fingervision.domain.measured_table import Channel
-from fingervision.storage.csv_columns import header_of, read_columns
-from fingervision.storage.number_columns import Numbers, numbers_in
+from fingervision.storage.number_columns import Numbers
 
 UNITS = ("_mm", "_mrad")
 U_PREFIXES = ("u_random_", "u_")
@@ -26,31 +23,6 @@ def channel_names(names: Sequence[str], taken: Collection[str]) -> list[str]:
         if name.endswith(UNITS) and not name.startswith("u_") and name not in taken and name not in NO_CHANNELS
     ]
     return [*found, *(f"{u}{name}" for u in U_PREFIXES for name in found if f"{u}{name}" in names)]
-
-
-def read_channels(path: Path, taken: Collection[str]) -> tuple[dict[str, Numbers], list[str]]:
-    """Read the channels of a table in fingervision's own format; a channel without numbers is omitted with a note.
-
-    Parameters
-    ----------
-    path : Path
-        The table, whose other columns have already been read.
-    taken : collection of str
-        Names of columns that have another meaning.
-    """
-    names = header_of(path)
-    wanted = [name for name in channel_names(names, taken) if names.count(name) == 1]
-    if not wanted:
-        return {}, []
-    cells = read_columns(path, (), tuple(wanted))
-    found: dict[str, Numbers] = {}
-    notes = []
-    for name in wanted:
-        try:
-            found[name] = numbers_in(path, name, cells[name])
-        except FingervisionError as error:
-            notes.append(f"the column {name} was left out: {error}")
-    return found, notes
 
 
 def channels_of(values: Mapping[str, Numbers], rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> dict[str, Channel]:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fingervision.domain.errors import DataError
-from fingervision.storage.finite import is_number
+from fingervision.storage.number_columns import is_number
 
 Path = tuple[str | int, ...]
 

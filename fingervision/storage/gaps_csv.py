@@ -1,90 +1,111 @@
 """The file gaps.csv: one row per video frame, written during the measurement and valid at any interruption."""
 
 import csv
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Protocol
+from typing import Annotated, Protocol
 
-from fingervision.domain.errors import OutputError
+import numpy as np
+
+from fingervision.domain.errors import DataError, OutputError
+from fingervision.domain.field import Field, names_of
 from fingervision.domain.status import Status
+from fingervision.storage.csv_columns import read_columns
 from fingervision.storage.durable import replaced
-from fingervision.storage.line_file import LineFile, cell, quoted
+from fingervision.storage.row_file import RowFile, cell, quoted, row_of
 
-COLUMNS = (
-    "frame,time_s,status,gap_mm,u_gap_mm,u_random_mm,gap_px,u_gap_px,"
-    "left_x_px,left_y_px,right_x_px,right_y_px,left_tip_px,right_tip_px,left_mm,right_mm,"
-    "u_shift_px,fingers,held_px,held_mm"
-)
 # Decimal places; a nanosecond, a hundred-thousandth of a pixel and a tenth of a nanometre are below any uncertainty.
 TIME_PLACES, PX_PLACES, MM_PLACES, FORCE_PLACES = 9, 5, 7, 6
+# Inputs that differ by less (mm) count as one part, because stages do not return to a position more exactly.
+SAME_INPUT_PLACES = 3
 
 
 @dataclass(frozen=True, slots=True)
 class GapRow:
-    """One row of gaps.csv; None is written as an empty cell.
+    """One row of gaps.csv; None is written as an empty cell."""
 
-    Parameters
-    ----------
-    frame : int
-        Number of the video frame in the recording, from 0.
-    time_s : float or None
-        Presentation time of the frame.
-    status : Status
-        Whether the frame has a gap, and if not, the reason.
-    gap_mm, u_gap_mm, u_random_mm : float or None
-        Gap, its standard uncertainty with all contributions of the budget, and the random part of this uncertainty.
-    gap_px, u_gap_px : float or None
-        Gap in the picture and its random standard uncertainty.
-    left_x_px, left_y_px, right_x_px, right_y_px : float or None
-        Coordinates of the two measuring points in the picture.
-    left_tip_px, right_tip_px : float or None
-        Coordinates of the tips along the fingers' axis.
-    left_mm, right_mm : float or None
-        Coordinates of the measuring points across the fingers, from the centre of the picture.
-    u_shift_px : float or None
-        Standard uncertainty of `gap_px` from systematic effects in the picture, equal in every frame.
-    fingers : str
-        `dark` or `light`: brightness of the fingers relative to the background; empty without a gap.
-    held_px, held_mm : float or None
-        Width of a part held between the fingers.
-    run : str
-        Run of the drive to which the frame belongs; empty if there is none.
-    input_mm, force_n : float or None
-        Input displacement and force of the drive at the frame's time.
-    """
+    frame: Annotated[int, Field("number of the frame in the recording, from 0")]
+    time_s: Annotated[
+        float | None, Field("presentation time from the container; empty if there is none", "s", TIME_PLACES)
+    ]
+    status: Annotated[Status, Field("`ok`, or why there is no gap (table below)")]
+    gap_mm: Annotated[float | None, Field("distance of the two measuring points", "mm", MM_PLACES)] = None
+    u_gap_mm: Annotated[
+        float | None,
+        Field(
+            "standard uncertainty of `gap_mm`, with everything in the calibration's budget; empty with a bare "
+            "`--px-per-mm`, without `--u-px-per-mm`",
+            "mm",
+            MM_PLACES,
+            low=0.0,
+        ),
+    ] = None
+    u_random_mm: Annotated[
+        float | None,
+        Field(
+            "random part of `u_gap_mm`, independent from frame to frame (standard uncertainty)",
+            "mm",
+            MM_PLACES,
+            low=0.0,
+        ),
+    ] = None
+    gap_px: Annotated[float | None, Field("gap in the picture", "px", PX_PLACES)] = None
+    u_gap_px: Annotated[
+        float | None, Field("random part of the standard uncertainty of `gap_px`", "px", PX_PLACES, low=0.0)
+    ] = None
+    left_x_px: Annotated[float | None, Field("coordinates of the measuring points", "px", PX_PLACES)] = None
+    left_y_px: Annotated[float | None, Field("coordinates of the measuring points", "px", PX_PLACES)] = None
+    right_x_px: Annotated[float | None, Field("coordinates of the measuring points", "px", PX_PLACES)] = None
+    right_y_px: Annotated[float | None, Field("coordinates of the measuring points", "px", PX_PLACES)] = None
+    left_tip_px: Annotated[float | None, Field("positions of the tips along the fingers' axis", "px", PX_PLACES)] = None
+    right_tip_px: Annotated[float | None, Field("positions of the tips along the fingers' axis", "px", PX_PLACES)] = (
+        None
+    )
+    left_mm: Annotated[
+        float | None,
+        Field("positions of the measuring points across the fingers, from the middle of the image", "mm", MM_PLACES),
+    ] = None
+    right_mm: Annotated[
+        float | None,
+        Field("positions of the measuring points across the fingers, from the middle of the image", "mm", MM_PLACES),
+    ] = None
+    u_shift_px: Annotated[
+        float | None,
+        Field(
+            "standard uncertainty of `gap_px` by what remains undecided in the picture (such as a shadow) and is alike "
+            "in every frame",
+            "px",
+            PX_PLACES,
+            low=0.0,
+        ),
+    ] = None
+    fingers: Annotated[str, Field("`dark` or `light` against the background; empty without a gap")] = ""
+    held_px: Annotated[float | None, Field("width of a part held between the fingers", "px", PX_PLACES)] = None
+    held_mm: Annotated[float | None, Field("width of a part held between the fingers", "mm", MM_PLACES)] = None
+    run: Annotated[str, Field("with `--drive`: run at the time of the frame; empty if there is none")] = ""
+    input_mm: Annotated[
+        float | None,
+        Field(
+            "with `--drive`: input at the time of the frame. Empty outside the log, between two runs, and within a "
+            "jump of the log from one place of rest to another",
+            "mm",
+            MM_PLACES,
+        ),
+    ] = None
+    force_n: Annotated[
+        float | None,
+        Field("with `--drive`: force at the time of the frame, if the log has a force", "N", FORCE_PLACES),
+    ] = None
 
-    frame: int
-    time_s: float | None
-    status: Status
-    gap_mm: float | None = None
-    u_gap_mm: float | None = None
-    u_random_mm: float | None = None
-    gap_px: float | None = None
-    u_gap_px: float | None = None
-    left_x_px: float | None = None
-    left_y_px: float | None = None
-    right_x_px: float | None = None
-    right_y_px: float | None = None
-    left_tip_px: float | None = None
-    right_tip_px: float | None = None
-    left_mm: float | None = None
-    right_mm: float | None = None
-    u_shift_px: float | None = None
-    fingers: str = ""
-    held_px: float | None = None
-    held_mm: float | None = None
-    run: str = ""
-    input_mm: float | None = None
-    force_n: float | None = None
+
+DRIVE_COLUMNS = ("run", "input_mm", "force_n")
+COLUMNS = ",".join(name for name in names_of(GapRow) if name not in DRIVE_COLUMNS)
 
 
-class GapsCsv:
+class GapsCsv(RowFile[GapRow]):
     """Writes gaps.csv row by row.
-
-    Complete rows are written to the file at least every second. If the disk is full, the file is truncated after its
-    last complete row.
 
     Parameters
     ----------
@@ -92,61 +113,103 @@ class GapsCsv:
         The file; an existing file is replaced.
     drive_columns : tuple of str
         Columns for the drive: () or ("run", "input_mm") or ("run", "input_mm", "force_n").
-
-    Raises
-    ------
-    FingervisionError
-        The file cannot be written; also from `add` and `close`.
     """
 
     def __init__(self, path: Path, drive_columns: tuple[str, ...] = ()) -> None:
-        self._drive_columns = drive_columns
-        self._file = LineFile(path, ",".join((COLUMNS, *drive_columns)))
+        super().__init__(path, GapRow, (*COLUMNS.split(","), *drive_columns))
 
-    def __enter__(self) -> "GapsCsv":
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
+class GapsReader:
+    """Reads the complete lines of a gaps.csv that is still growing.
 
-    def add(self, rows: Sequence[GapRow]) -> None:
-        """Add rows, in order."""
-        self._file.add([self._line(row) for row in rows])
+    Parameters
+    ----------
+    path : Path
+        The file gaps.csv, which need not exist yet.
+    """
 
-    def close(self) -> None:
-        """Write pending rows and close the file; closing twice is allowed."""
-        self._file.close()
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.rows: list[GapRow] = []
+        """The rows of the file so far, in a new list after each change."""
+        self._columns: tuple[str, ...] = ()
+        self._place, self._last_line = 0, b""
+        self._file: tuple[int, int] | None = None
 
-    def _line(self, row: GapRow) -> str:
-        cells = [
-            str(row.frame),
-            cell(row.time_s, TIME_PLACES),
-            row.status.value,
-            cell(row.gap_mm, MM_PLACES),
-            cell(row.u_gap_mm, MM_PLACES),
-            cell(row.u_random_mm, MM_PLACES),
-            cell(row.gap_px, PX_PLACES),
-            cell(row.u_gap_px, PX_PLACES),
-            cell(row.left_x_px, PX_PLACES),
-            cell(row.left_y_px, PX_PLACES),
-            cell(row.right_x_px, PX_PLACES),
-            cell(row.right_y_px, PX_PLACES),
-            cell(row.left_tip_px, PX_PLACES),
-            cell(row.right_tip_px, PX_PLACES),
-            cell(row.left_mm, MM_PLACES),
-            cell(row.right_mm, MM_PLACES),
-            cell(row.u_shift_px, PX_PLACES),
-            row.fingers,
-            cell(row.held_px, PX_PLACES),
-            cell(row.held_mm, MM_PLACES),
-        ]
-        if self._drive_columns:
-            cells += [quoted(row.run), cell(row.input_mm, MM_PLACES)]
-        if "force_n" in self._drive_columns:
-            cells.append(cell(row.force_n, FORCE_PLACES))
-        return ",".join(cells)
+    def refresh(self) -> bool:
+        """Read the rows that were added to the file; return True if the file was replaced, and all rows are new.
+
+        A file is another one if the operating system numbers it differently, or if it no longer has, at the same
+        place, the line that was read last.
+
+        Raises
+        ------
+        OSError
+            The table exists but cannot be read.
+        DataError
+            A line has not as many cells as the header.
+        """
+        try:
+            with self.path.open("rb") as file:
+                status = os.fstat(file.fileno())
+                identity = status.st_dev, status.st_ino
+                file.seek(self._place - len(self._last_line))
+                # Until its header is written, a file has nothing that could have been read of it.
+                is_same = (
+                    self._place > 0 and identity == self._file and file.read(len(self._last_line)) == self._last_line
+                )
+                if not is_same:
+                    file.seek(0)
+                text = file.read()
+        except FileNotFoundError:
+            return False
+        is_replaced = not is_same and self._place > 0
+        whole = text[: text.rfind(b"\n") + 1]
+        lines = whole.splitlines(keepends=True)
+        table = list(csv.reader(line.decode("utf-8") for line in lines))
+        columns = self._columns if is_same else tuple(table.pop(0) if table else ())
+        for cells in table:
+            if len(cells) != len(columns):
+                raise DataError(
+                    f"Each line of {self.path} must have {len(columns)} cells, as its header, but one has "
+                    f"{len(cells)}: measure the recording again."
+                )
+        rows = [row_of(GapRow, columns, cells) for cells in table]
+        if is_same and not rows:
+            return False
+        self.rows = self.rows + rows if is_same else rows
+        self._file, self._columns = identity, columns
+        self._place = len(whole) + (self._place if is_same else 0)
+        self._last_line = lines[-1] if lines else b""
+        return is_replaced
+
+
+def read_gap_readings(path: Path, by_input: bool) -> dict[float | None, list[float]]:
+    """Read the gaps of all video frames that have a gap, as repeated readings of parts for a study of repeatability.
+
+    Parameters
+    ----------
+    path : Path
+        A gaps.csv.
+    by_input : bool
+        Whether each different input of the drive counts as a separate part; otherwise the recording shows a single
+        part, named None.
+
+    Raises
+    ------
+    DataError, InputFileError
+        The file cannot be read or holds no gaps.
+    """
+    table = read_columns(path, ("gap_mm", "input_mm") if by_input else ("gap_mm",))
+    gap = table.numbers("gap_mm")
+    inputs = table.numbers("input_mm") if by_input else None
+    readings: dict[float | None, list[float]] = {}
+    for row in np.flatnonzero(gap.present if inputs is None else gap.present & inputs.present).tolist():
+        part = None if inputs is None else round(float(inputs.value[row]), SAME_INPUT_PLACES)
+        readings.setdefault(part, []).append(float(gap.value[row]))
+    if not readings:
+        raise DataError(f"The table {path} must hold at least one gap, but holds none: give a gaps.csv with gaps.")
+    return readings
 
 
 class Driven(Protocol):

@@ -12,7 +12,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Body, Gripper, Hinge, Lever, Links, Material, SNLine
 from fingervision.models.gripper_outline import check_outline, check_stated_size
 from fingervision.models.plane_shapes import crosses_itself
-from fingervision.storage.finite import is_number
+from fingervision.storage.number_columns import is_number
 from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
 from fingervision.storage.toml_section import read_document
 

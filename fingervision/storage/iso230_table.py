@@ -5,19 +5,17 @@ deviation_um`, optionally with `time_s, run, u_random_mm`. Matrix form, one row 
 as `up_1_deviation_um`, `down_1_deviation_um`; or `cycle_1_position_mm` with a `direction` column.
 """
 
-import csv
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from fingervision.domain.errors import DataError
-from fingervision.storage.csv_columns import number, read_columns
-from fingervision.storage.plain_file import plain
+from fingervision.storage.csv_columns import header_of, read_columns
+from fingervision.storage.number_columns import Numbers, numbers_in
 
 # Reconstruct the path of an axis between readings at target positions, from the direction of approach of each.
 
@@ -157,6 +155,8 @@ MATRIX = re.compile(
 FORWARD = {"forward", "forwards", "fwd"}
 """Ambiguous words for a direction: some authors mean along the axis, others towards its zero."""
 UNSIDED = "cycle"
+OTHERS = ("direction", "cycle", "run", "time_s", "u_random_mm")
+"""Names of the other columns."""
 SMALLEST_TRAVEL = 0.05
 """Ratio of the range of positions to the range of targets below which the positions must be mislabelled deviations."""
 LARGEST_DEVIATION = 0.5
@@ -199,51 +199,49 @@ def read_iso230_table(path: Path) -> Iso230Rows | None:
         A column is missing, a word is not a direction, a reading occurs twice, or deviations are labelled as positions
         (or positions as deviations).
     """
-    header = _header(path)
-    if TARGET not in header or "input_mm" in header:
+    names = header_of(path)
+    if TARGET not in names or "input_mm" in names:
         return None
-    return iso230_rows(path, header, partial(read_columns, path))
+    known = [name for name in names if name in (*QUANTITIES, *OTHERS) or MATRIX.fullmatch(name)]
+    table = read_columns(path, (TARGET,), texts=(TARGET, *known))
+    return iso230_rows(path, {name: table.texts(name) or () for name in table.columns})
 
 
-def iso230_rows(
-    path: Path, header: Sequence[str], columns: Callable[[tuple[str, ...], tuple[str, ...]], dict[str, list[str]]]
-) -> Iso230Rows:
+def iso230_rows(path: Path, columns: Mapping[str, Sequence[str]]) -> Iso230Rows:
     """Convert the columns of a table of targets, cycles and directions.
 
     Parameters
     ----------
     path : Path
         File of the columns, for error messages.
-    header : sequence of str
-        Names of the columns.
-    columns : callable
-        Function that returns the cells of required and optional columns by name, like `csv_columns.read_columns`.
+    columns : mapping of str to sequence of str
+        Cells of the columns, by name.
 
     Raises
     ------
     DataError
         For the same reasons as in `read_iso230_table`.
     """
-    blocks = {name: match for name in header if (match := MATRIX.fullmatch(name)) is not None}
+    blocks = {name: match for name in columns if (match := MATRIX.fullmatch(name)) is not None}
     quantities = {name: match["quantity"].lower() for name, match in blocks.items()} or {
-        name: name for name in QUANTITIES if name in header
+        name: name for name in QUANTITIES if name in columns
     }
     kinds = sorted(set(quantities.values()))
     if len(kinds) != 1:
         raise DataError(
             f"{path} must have a readings column named one of {', '.join(QUANTITIES)}, but has "
-            f"{' and '.join(kinds) or ','.join(header)}: rename that column, or use one column for each "
+            f"{' and '.join(kinds) or ','.join(columns)}: rename that column, or use one column for each "
             "cycle and direction (up_1_deviation_um, down_1_deviation_um and so on)."
         )
     sided = bool(blocks) and all(match["side"].lower() != UNSIDED for match in blocks.values())
-    if not sided and "direction" not in header:
+    if not sided and "direction" not in columns:
         raise DataError(
             f"{path} must have a column direction (up or down: the side from which the target was approached), but "
-            f"has {','.join(header)}: add it; or, if the rows are in the order of travel, name the columns "
+            f"has {','.join(columns)}: add it; or, if the rows are in the order of travel, name the columns "
             "input_mm and gap_mm."
         )
     wanted = ("run", *(() if sided else ("direction",)), *(() if blocks else ("cycle", "time_s", "u_random_mm")))
-    cells = columns((TARGET, *quantities), wanted)
+    cells = {name: columns[name] for name in (TARGET, *quantities, *wanted) if name in columns}
     listed = _cells(cells, blocks, next(iter(quantities)))
     readings, words = _readings(path, listed, kinds[0], cells)
     _check_quantity(path, readings, kinds[0])
@@ -262,19 +260,6 @@ def iso230_rows(
     return Iso230Rows(rows, (*notes, *assumed))
 
 
-def _header(path: Path) -> list[str]:
-    """Column names in the first line that is not a comment.
-
-    The function returns None if the file cannot be read (`read_columns` reports the error).
-    """
-    try:
-        lines = plain(path).read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError):
-        return []
-    first = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
-    return [cell.strip() for cell in next(csv.reader([first]), [])]
-
-
 @dataclass(frozen=True, slots=True)
 class _Cell:
     """A cell with a reading: its row, column, word for the direction, and cycle ('' if only the order states it)."""
@@ -285,7 +270,7 @@ class _Cell:
     cycle: str
 
 
-def _cells(cells: dict[str, list[str]], blocks: dict[str, re.Match[str]], column: str) -> list[_Cell]:
+def _cells(cells: Mapping[str, Sequence[str]], blocks: dict[str, re.Match[str]], column: str) -> list[_Cell]:
     """List all cells that may contain a reading, in the long form or the matrix form of the table."""
     directions = cells.get("direction")
     if not blocks:
@@ -299,17 +284,22 @@ def _cells(cells: dict[str, list[str]], blocks: dict[str, re.Match[str]], column
 
 
 def _readings(
-    path: Path, listed: list[_Cell], quantity: str, cells: dict[str, list[str]]
+    path: Path, listed: list[_Cell], quantity: str, cells: Mapping[str, Sequence[str]]
 ) -> tuple[list[Reading], set[str]]:
     """Convert cells to readings; also return the words for directions that the table uses."""
     factor, relative = QUANTITIES[quantity], quantity.startswith("deviation")
+    columns = {
+        name: numbers_in(path, name, cells[name])
+        for name in (TARGET, "time_s", "u_random_mm", *dict.fromkeys(cell.column for cell in listed))
+        if name in cells
+    }
     names = [cell.cycle for cell in listed]
     numbers = {name: k for k, name in enumerate(sorted(set(names), key=_cycle_order(names)))}
     out: list[Reading] = []
     seen: dict[tuple[str, float, int, int], int] = {}
     words = set()
     for cell in listed:
-        target = number(path, TARGET, cell.row, cells[TARGET][cell.row])
+        target = _at(columns.get(TARGET), cell.row)
         if target is None:
             raise DataError(f"{TARGET} must be a number, but is empty in data row {cell.row + 1} of {path}.")
         word = cell.direction.strip().lower().replace(MINUS, "-")
@@ -322,7 +312,7 @@ def _readings(
             )
         words.add(word)
         run = cells["run"][cell.row] if "run" in cells else ""
-        value = number(path, cell.column, cell.row, cells[cell.column][cell.row])
+        value = _at(columns[cell.column], cell.row)
         side = SIDES[word]
         cycle = numbers[cell.cycle]
         key = (run, target, side, cycle)
@@ -335,10 +325,14 @@ def _readings(
             )
         seen[key] = seen.get(key, 0) + 1
         position = None if value is None else factor * value + (target if relative else 0.0)
-        timed = number(path, "time_s", cell.row, cells["time_s"][cell.row]) if "time_s" in cells else None
-        u = number(path, "u_random_mm", cell.row, cells["u_random_mm"][cell.row]) if "u_random_mm" in cells else None
+        timed, u = (_at(columns.get(name), cell.row) for name in ("time_s", "u_random_mm"))
         out.append(Reading(target, position, side, cycle, run, timed, u))
     return out, words
+
+
+def _at(numbers: Numbers | None, row: int) -> float | None:
+    """Number in a row of a column; None if there is none."""
+    return float(numbers.value[row]) if numbers is not None and numbers.present[row] else None
 
 
 def _cycle_order(names: list[str]) -> Callable[[str], float]:

@@ -11,11 +11,11 @@ from pathlib import Path
 from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
-from fingervision.storage.csv_columns import number, read_columns
+from fingervision.storage.csv_columns import read_columns
 from fingervision.storage.durable import Flushing, flush
 from fingervision.storage.gaps_csv import TIME_PLACES
-from fingervision.storage.line_file import cell, quoted
 from fingervision.storage.plain_file import json_of
+from fingervision.storage.row_file import cell, quoted
 from fingervision.storage.run_files import RUN
 
 LOST = "lost.csv"
@@ -100,14 +100,15 @@ def lost_frames(files: Sequence[Path]) -> tuple[LostFrame, ...]:
             f"{path} must list the frames of {files[0].name} that were damaged on arrival, but is missing: put the "
             "file back, or measure a copy of the video in another folder, where damaged frames may look whole."
         )
-    columns = read_columns(path, ("time_s", "status", "words"), ())
+    table = read_columns(path, HEADER.split(","), texts=("status", "words"))
+    times = table.numbers("time_s", complete=True).value.tolist()
     found = []
-    for row, (time, status, words) in enumerate(zip(*(columns[name] for name in HEADER.split(",")), strict=True)):
-        time_s = number(path, "time_s", row, time)
-        if time_s is None or status not in (Status.DAMAGED, Status.DUPLICATE):
+    rows = zip(times, table.texts("status") or (), table.texts("words") or (), strict=True)
+    for row, (time_s, status, words) in enumerate(rows):
+        if status not in (Status.DAMAGED, Status.DUPLICATE):
             raise DataError(
-                f"Row {row + 1} of {path} must have a time and `damaged` or `duplicate`, but has '{time}' and "
-                f"'{status}': copy the run again."
+                f"Line {table.lines[row]} of {path} must have the status `damaged` or `duplicate`, but has '{status}': "
+                "copy the run again."
             )
         found.append(LostFrame(row, time_s, Status(status), words))
     return tuple(sorted(found, key=lambda lost: lost.time_s or 0.0))

@@ -9,41 +9,11 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable, RecordedPath
-from fingervision.domain.reference_slot import ReferenceSlot
-from fingervision.storage.assumed_response import response_note_beside
-from fingervision.storage.channel_columns import channels_of, read_channels
-from fingervision.storage.csv_columns import read_block, read_columns
+from fingervision.storage.beside import response_note_beside, slots_beside, u_clock_beside
+from fingervision.storage.channel_columns import channel_names, channels_of
+from fingervision.storage.csv_columns import read_columns
 from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
 from fingervision.storage.number_columns import Numbers, numbers_in
-from fingervision.storage.plain_file import json_of
-from fingervision.storage.run_files import RUN
-from fingervision.storage.summary_json import u_clock_beside
-
-# Reference slots measured in a run on the test bed, from the run.json beside the run's table.
-
-KEY = "reference_slots"
-
-
-def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
-    """Read the reference slots of the run to which a table belongs; empty without a run or without measured slots.
-
-    Parameters
-    ----------
-    table : Path
-        A table in a run folder, or any other table.
-    """
-    try:
-        about = json_of(table.parent / RUN)
-        names = (about["samples"], about.get("joined"))
-        listed = about.get(KEY, []) if table.name in names else []
-        return tuple(
-            ReferenceSlot(*(float(slot[key]) for key in ("size_mm", "u_size_mm", "measured_mm", "u_random_mm")))
-            for slot in listed
-        )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        # The folder belongs to another program, or the run was interrupted.
-        return ()
-
 
 FEWEST_ROWS = 5
 PATH = ("input_mm", "time_s")
@@ -65,24 +35,23 @@ def read_measured_table(path: Path) -> MeasuredTable:
     targets = read_iso230_table(path)
     if targets is not None:
         return targets_as_rows(path, targets)
-    block = read_block(path)
-    if block is not None and {"input_mm", "gap_mm"} <= block.keys() and "run" not in block:
-        values, runs = {name: Numbers.whole(block[name]) for name in NUMBERS if name in block}, None
-    else:
-        cells = read_columns(path, ("input_mm", "gap_mm"), (*NUMBERS[2:], "run"))
-        values, runs = _numbers(path, cells), cells.get("run")
-    channels, said = read_channels(path, NUMBERS)
-    return measured_rows(path, values, runs, said, channels=channels)
+    table = read_columns(path, NUMBERS[:2], NUMBERS[2:], ("run",), lambda names: channel_names(names, NUMBERS))
+    values = {name: table.numbers(name) for name in NUMBERS if name in table}
+    channels: dict[str, Numbers] = {}
+    said = []
+    for name in channel_names(list(table.columns), NUMBERS):
+        try:
+            channels[name] = table.numbers(name)
+        except DataError as error:
+            said.append(f"the column {name} was left out: {error}")
+    return measured_rows(path, values, table.texts("run"), said, channels=channels)
 
 
 def targets_as_rows(path: Path, targets: Iso230Rows, notes: Sequence[str] = ()) -> MeasuredTable:
     """Convert a table of targets, cycles and directions to the rows of a measured table."""
     cells = targets.cells()
-    return measured_rows(path, _numbers(path, cells), cells.get("run"), (*notes, *targets.notes), count_rows=False)
-
-
-def _numbers(path: Path, cells: Mapping[str, list[str]]) -> dict[str, Numbers]:
-    return {name: numbers_in(path, name, cells[name]) for name in NUMBERS if name in cells}
+    values = {name: numbers_in(path, name, cells[name]) for name in NUMBERS if name in cells}
+    return measured_rows(path, values, cells.get("run"), (*notes, *targets.notes), count_rows=False)
 
 
 def measured_rows(

@@ -1,6 +1,5 @@
 """File of a camera's response: `level,light`, one row per grey level from 0 to full scale."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +7,8 @@ from numpy.typing import NDArray
 
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
-from fingervision.domain.errors import DataError, OutputError, UsageError, unreadable
-from fingervision.storage.decimal_number import decimal_number
-from fingervision.storage.plain_file import NotUtf8Error, text_of, why
+from fingervision.domain.errors import DataError, OutputError, UsageError
+from fingervision.storage.csv_columns import read_columns
 
 COLUMNS = ("level", "light")
 # Full-scale levels of pictures, by bit depth.
@@ -47,17 +45,8 @@ def read_response(path: Path) -> CameraResponse:
     DataError, InputFileError
         The file cannot be read, or is not a camera response.
     """
-    try:
-        lines = text_of(path).splitlines(keepends=True)
-        rows = list(csv.reader(line for line in lines if not line.startswith("#")))
-    except (OSError, NotUtf8Error) as error:
-        raise unreadable(error)(f"The camera response {path} could not be read: {why(error)}.") from error
-    if not rows or tuple(cell.strip() for cell in rows[0]) != COLUMNS:
-        raise DataError(f"{path} must begin with the line {','.join(COLUMNS)}, but does not.")
-    try:
-        level, light = np.array([[decimal_number(cell) for cell in row] for row in rows[1:] if row]).reshape(-1, 2).T
-    except ValueError as error:
-        raise DataError(f"Every row of {path} must be two numbers, level and light ({error}).") from error
+    table = read_columns(path, COLUMNS)
+    level, light = (table.numbers(name, complete=True).value for name in COLUMNS)
     top = level[-1] if level.size else 0.0
     if top not in TOP_LEVELS:
         depths = ", ".join(map(str, TOP_LEVELS))

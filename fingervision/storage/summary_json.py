@@ -76,35 +76,3 @@ def refuse_other_recording(folder: Path, recording: str) -> None:
     if not Path(of).exists() and Path(of).name == Path(recording).name:
         return
     raise UsageError(f"--out must be a folder of its own, but {folder} holds the results of {of}: name another folder.")
-
-
-def measurement_beside(table: Path) -> Mapping[str, Any]:
-    """Content of the summary beside a gaps.csv; empty for any other table."""
-    if table.name != GAPS:
-        return {}
-    try:
-        found = json_of(table.parent / SUMMARY)
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
-
-
-def u_clock_beside(table: Path) -> float:
-    """Standard uncertainty (s) of the offset between the clocks of gap and drive, from the summary beside a gaps.csv.
-
-    Parameters
-    ----------
-    table : Path
-        A gaps.csv, or any other table.
-
-    Returns
-    -------
-    float
-        Standard uncertainty in s; 0 for any other table, or if the offset was given instead of estimated.
-    """
-    try:
-        settings = measurement_beside(table)["settings"]
-        found = float(settings["u_drive_time_s"]) if settings["drive_offset"] == "found" else 0.0
-    except (ValueError, LookupError, TypeError):
-        return 0.0
-    return found if 0.0 < found < float("inf") else 0.0

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fingervision.domain.errors import DataError, InputFileError
-from fingervision.storage.finite import is_number
+from fingervision.storage.number_columns import is_number
 from fingervision.storage.plain_file import NotUtf8Error, parsed, text_of
 
 

@@ -99,10 +99,7 @@ def iso230_rows_of(raw: RawTable, given: Entry) -> Iso230Rows | None:
         unique = {question.key: question for question in questions}
         raise OpenQuestionError(raw.path, KIND, list(unique.values()))
 
-    def columns(required: tuple[str, ...], known: tuple[str, ...]) -> dict[str, list[str]]:
-        return {name: content[name] for name in (*required, *known) if name in content}
-
-    return iso230_rows(raw.path, list(content), columns)
+    return iso230_rows(raw.path, content)
 
 
 def _places(names: Sequence[ColumnName], role: str, given: Entry) -> list[int]:

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from fingervision.storage.csv_columns import header_of
 from fingervision.tables.mapping import Entry
 
 OWN = {"measured": ("input_mm", "gap_mm"), "drive": ("time_s", "input_mm"), "simulation": ("input_mm", "gap_mm")}
 TARGET = "target_mm"
-HEAD_BYTES = 100_000
 
 
 def is_own(path: Path, kind: str, given: Entry) -> bool:
@@ -18,17 +18,7 @@ def is_own(path: Path, kind: str, given: Entry) -> bool:
         return False
     if not path.is_file():
         return True
-    try:
-        with path.open("rb") as file:
-            head = file.read(HEAD_BYTES).decode(
-                "utf-8-sig", errors="strict" if path.stat().st_size < HEAD_BYTES else "replace"
-            )
-    except (OSError, UnicodeDecodeError):
-        return False
-    if "\x00" in head:
-        return False
-    header = next((line for line in head.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
-    names = [cell.strip().strip('"').strip() for cell in header.split(",")]
+    names = header_of(path)
     if kind == "measured" and TARGET in names and "input_mm" not in names:
         from fingervision.storage.iso230_table import MATRIX, QUANTITIES
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.numbers import MINUS
-from fingervision.storage.number_block import number_block
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.number_columns import Numbers, number_block
 from fingervision.tables.cells import which_mark
 from fingervision.tables.column_names import column_name
 from fingervision.tables.dialect import (

@@ -39,7 +39,7 @@ def write(folder: Path, text: str, name: str = "measured.csv") -> Path:
         ("input_mm,gap_mm\n" + "\n".join(f"{k},4.5" for k in range(6)), "gap_mm must change, but is 4.5 in every row"),
         ("input_um,gap_mm\n" + GOOD, "must have a column input_mm, but has input_um,gap_mm: rename input_um"),
         ("input_mm,spalt\n" + GOOD, "must have a column gap_mm, but has input_mm,spalt: add it"),
-        ("input_mm,gap_mm\n0,NaN\n" + GOOD, "gap_mm must be a finite number, but is NaN in data row 1"),
+        ("input_mm,gap_mm\n0,NaN\n" + GOOD, "gap_mm must be a finite number, but is 'NaN' in line 2"),
         (
             "input_mm,gap_mm,time_s\n" + "\n".join(f"0.{k},{k},{k // 2}" for k in range(8)),
             "time_s must be unique within a run, but 0 s occurs twice",

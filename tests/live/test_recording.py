@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from fingervision.storage.line_file import FLUSH_EVERY_S
+from fingervision.storage.row_file import FLUSH_EVERY_S
 
 SCALE = ("--px-per-mm", "34")
 LOST_AT_MOST_S = 1.0

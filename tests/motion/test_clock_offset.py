@@ -9,7 +9,7 @@ import pytest
 from fingervision.domain.drive import DriveHistory
 from fingervision.motion.clock.alignment import find_clock_offset
 from fingervision.motion.clock.clock_offset import ClockOffset, NoClockOffset
-from fingervision.storage.summary_json import u_clock_beside
+from fingervision.storage.beside import u_clock_beside
 from tests.benchmarks import drawn_recordings
 
 SIGMAS = 3.5

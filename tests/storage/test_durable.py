@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from fingervision.domain.frame import Frame
+from fingervision.domain.status import Status
 from fingervision.storage.calibration_json import read_calibration, write_calibration
 from fingervision.storage.durable import replaced
-from fingervision.storage.line_file import LineFile
+from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.recorded_video import RecordedVideo
+from fingervision.storage.row_file import RowFile
 from fingervision.storage.run_files import RunFiles
 from fingervision.storage.summary_json import write_summary
 
@@ -73,15 +75,15 @@ def test_a_growing_table_and_video_are_on_the_disk_within_a_second(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, flushed: list[tuple[int, int]]
 ) -> None:
     clock = [100.0]
-    for module in ("line_file", "durable"):
+    for module in ("row_file", "durable"):
         monkeypatch.setattr(f"fingervision.storage.{module}.monotonic", lambda: clock[0])
     table, video = tmp_path / "gaps.csv", tmp_path / "video.mp4"
-    lines, film = LineFile(table, "frame"), RecordedVideo(video, None)
+    lines, film = RowFile(table, GapRow, ("frame",)), RecordedVideo(video, None)
     sizes: dict[Path, list[tuple[float, int]]] = {table: [], video: []}
     pixels = np.random.default_rng(1).integers(0, 255, (48, 64), np.uint8)
     for k in range(50):
         clock[0] += 0.04
-        lines.add((str(k),))
+        lines.add([GapRow(k, None, Status.OK)])
         film.add(Frame(pixels, k, 0.04 * k), ())
         for path, seen in sizes.items():
             on_disk = max((size for inode, size in flushed if inode == path.stat().st_ino), default=0)

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.status import Status
-from fingervision.storage.gaps_csv import COLUMNS, MM_PLACES, GapRow, GapsCsv
-from fingervision.storage.gaps_reader import GapsReader
+from fingervision.storage.gaps_csv import COLUMNS, MM_PLACES, GapRow, GapsCsv, GapsReader
 
 HEADER = (
     "frame,time_s,status,gap_mm,u_gap_mm,u_random_mm,gap_px,u_gap_px,left_x_px,left_y_px,right_x_px,right_y_px,"

@@ -217,7 +217,7 @@ def test_a_file_that_is_not_there_is_left_to_its_reader(tmp_path: Path) -> None:
         ("target_mm,cycle,direction,position_mm\n0,1,sideways,0", "but is sideways in data row 1"),
         ("target_mm,cycle,direction,position_mm\n0,1,,0", "but is empty in data row 1"),
         ("target_mm,cycle,direction,position_mm\n,1,up,0", "target_mm must be a number, but is empty in data row 1"),
-        ("target_mm,cycle,direction,position_mm\n0,1,up,nan", "position_mm must be a finite number, but is nan"),
+        ("target_mm,cycle,direction,position_mm\n0,1,up,nan", "position_mm must be a finite number, but is 'nan'"),
         ("target_mm,cycle,direction,position_mm\n0,1,up,0\n0,1,up,0", "0 mm, cycle 1, up occurs twice"),
         ("target_mm,cycle,direction,position_mm\n0,1,up", "must have 4 cells"),
         (

@@ -18,11 +18,11 @@ from fingervision.domain.parameter import Estimate
 from fingervision.effects.position_error_map import curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import FunctionModel
+from fingervision.storage.beside import measurement_beside
 from fingervision.storage.model_toml import write_model
 from fingervision.storage.provenance import Provenance
 from fingervision.storage.recipe_toml import write_recipe
 from fingervision.storage.report_json import report_document, write_report
-from fingervision.storage.summary_json import measurement_beside
 
 # Sentences on the clocks and the gap's uncertainty, from the summary of a measured table.
 

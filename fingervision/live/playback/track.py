@@ -7,8 +7,7 @@ from calib.measured_scale import Calibration
 from calib.stated_scale import is_stated
 from fingervision.live.background import WAITED_FOR, BackgroundCommand
 from fingervision.live.choices import Choices
-from fingervision.storage.gaps_csv import GapRow
-from fingervision.storage.gaps_reader import GapsReader
+from fingervision.storage.gaps_csv import GapRow, GapsReader
 
 # Exit codes of `measure` after which the table is complete: done, no frame has a gap, some frames are damaged.
 WHOLE = (0, 1, 3)

@@ -14,7 +14,7 @@ from fingervision import __version__
 from fingervision.domain.model import Model
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.run_files import CALIBRATION, EVENTS, SCHEMA, VIDEO
-from fingervision.storage.simulation_csv import write_simulation
+from fingervision.storage.simulation_table import write_simulation
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.motion.soft_limits import SoftLimits

@@ -1,0 +1,123 @@
+"""What summary.json, run.json and gaps.csv say of the table or recording beside which they lie.
+
+These files are optional: a folder without them, or one of another program, says nothing, and that is no error.
+"""
+
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fingervision.domain.errors import FingervisionError
+from fingervision.domain.reference_slot import ReferenceSlot
+from fingervision.storage.csv_columns import read_columns
+from fingervision.storage.plain_file import json_of
+from fingervision.storage.run_files import RUN
+from fingervision.storage.summary_json import GAPS, SUMMARY
+
+SLOTS = "reference_slots"
+"""Key of run.json for the reference slots that were measured in a run on the test bed."""
+
+
+def _document(path: Path) -> Mapping[str, Any]:
+    """Content of a JSON document; empty if there is none."""
+    try:
+        found = json_of(path)
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def measurement_beside(table: Path) -> Mapping[str, Any]:
+    """Content of the summary beside a gaps.csv; empty for any other table."""
+    return _document(table.parent / SUMMARY) if table.name == GAPS else {}
+
+
+def u_clock_beside(table: Path) -> float:
+    """Standard uncertainty (s) of the offset between the clocks of gap and drive, from the summary beside a gaps.csv.
+
+    Parameters
+    ----------
+    table : Path
+        A gaps.csv, or any other table.
+
+    Returns
+    -------
+    float
+        Standard uncertainty in s; 0 for any other table, or if the offset was given instead of estimated.
+    """
+    try:
+        settings = measurement_beside(table)["settings"]
+        found = float(settings["u_drive_time_s"]) if settings["drive_offset"] == "found" else 0.0
+    except (ValueError, LookupError, TypeError):
+        return 0.0
+    return found if 0.0 < found < float("inf") else 0.0
+
+
+def response_note(summary: Mapping[str, Any], shifts_px: Iterable[float]) -> tuple[str, ...]:
+    """Sentence that the camera's response was assumed, and by how much this assumption may shift the gap.
+
+    An error of the response moves both edges equally in every frame, so that it has the signature of an offset.
+
+    Parameters
+    ----------
+    summary : mapping
+        Content of summary.json.
+    shifts_px : iterable of float
+        Values of the column u_shift_px of gaps.csv.
+
+    Returns
+    -------
+    tuple of str
+        One sentence if the summary says that the response is not known; none otherwise.
+    """
+    try:
+        settings, px_per_mm = summary["settings"], float(summary["scale"]["px_per_mm"])
+        is_known, response = settings.get("response_known", True), settings["response"]
+    except (LookupError, TypeError, ValueError, AttributeError):
+        return ()
+    if is_known is not False or not px_per_mm > 0.0:
+        return ()
+    found = list(shifts_px)
+    size = ""
+    if found and statistics.median(found) > 0.0:
+        size = f" by up to {1e3 * statistics.median(found) / px_per_mm:.2g} um (u_shift_px, median)"
+    return (
+        f"the camera's response is not known and was taken as {response}: another usual response may change all gaps "
+        f"equally{size}, like an offset; measure the response with `fingervision calibrate response`.",
+    )
+
+
+def response_note_beside(table: Path) -> tuple[str, ...]:
+    """Sentence that the response was assumed, for a gaps.csv with its summary.json; none for other tables."""
+    if not (summary := measurement_beside(table)):
+        return ()
+    try:
+        shifts = read_columns(table, (), ("u_shift_px",))
+        found = shifts.numbers("u_shift_px") if "u_shift_px" in shifts else None
+    except FingervisionError:
+        return ()
+    return response_note(summary, [] if found is None else found.value[found.present].tolist())
+
+
+def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
+    """Read the reference slots of the run to which a table belongs; empty without a run or without measured slots."""
+    about = _document(table.parent / RUN)
+    try:
+        listed = about.get(SLOTS, []) if table.name in (about["samples"], about.get("joined")) else []
+        return tuple(
+            ReferenceSlot(*(float(slot[key]) for key in ("size_mm", "u_size_mm", "measured_mm", "u_random_mm")))
+            for slot in listed
+        )
+    except (ValueError, LookupError, TypeError):
+        return ()
+
+
+def recorded_camera(files: Sequence[Path]) -> Mapping[str, str]:
+    """Read the camera's settings at the time of a recording that consists of given files; empty without a run.json."""
+    about = _document(files[0].parent / RUN) if len(files) == 1 else {}
+    try:
+        camera = about["device"]["camera"] if about["video"] == files[0].name else {}
+    except (LookupError, TypeError):
+        return {}
+    return {str(name): str(value) for name, value in camera.items()} if isinstance(camera, dict) else {}
