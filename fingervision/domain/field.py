@@ -27,10 +27,12 @@ class Field:
         Decimal places that are written; None for nine significant digits.
     low, high : float
         Smallest and largest number.
-    above : float
-        Number that must be exceeded.
+    above, below : float
+        Numbers that must be exceeded, and must not be reached.
     of : tuple of str
         Allowed words; empty for any text.
+    hint : str
+        What to do if a number lies beyond the limits.
     since : int
         Schema number of the first version of the format with this field.
     """
@@ -41,17 +43,25 @@ class Field:
     low: float = -inf
     high: float = inf
     above: float = -inf
+    below: float = inf
     of: tuple[str, ...] = ()
+    hint: str = ""
     since: int = 1
 
     def refusal(self, value: float) -> str | None:
         """Say what a number must be and is; None if it lies within the limits."""
-        if not value > self.above:
-            return f"must be greater than {self.above:g}, but is {value:g}"
-        if self.low <= value <= self.high:
+        if self.above < value < self.below and self.low <= value <= self.high:
             return None
-        limits = f"between {self.low:g} and {self.high:g}" if self.high < inf else f"at least {self.low:g}"
-        return f"must be {limits if self.low > -inf else f'at most {self.high:g}'}, but is {value:g}"
+        limits = [
+            f"{words} {limit:g}"
+            for words, limit in (
+                ("at least", self.low), ("greater than", self.above), ("at most", self.high), ("below", self.below),
+            )
+            if abs(limit) < inf
+        ]  # fmt: skip
+        must = f"between {self.low:g} and {self.high:g}" if inf not in (-self.low, self.high) else " and ".join(limits)
+        unit = f" {self.unit}" if self.unit else ""
+        return f"must be {must}{unit}, but is {value:g}{f': {self.hint}' if self.hint else ''}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,20 +78,15 @@ class Declared:
         The declaration.
     is_optional : bool
         Whether None is a value.
-    default : object
-        Value of a missing field; `dataclasses.MISSING` if the field is required.
+    is_required : bool
+        Whether the field must be given.
     """
 
     name: str
     kind: Any
     is_optional: bool
     field: Field
-    default: Any
-
-    @property
-    def is_required(self) -> bool:
-        """Whether the field must be given."""
-        return self.default is MISSING
+    is_required: bool
 
 
 def declared(record: Any) -> tuple[Declared, ...]:
@@ -99,7 +104,8 @@ def _declared(record: Any) -> tuple[Declared, ...]:
             hint, field = get_args(hint)[:2]
         is_optional = NoneType in get_args(hint)
         kind = next(one for one in get_args(hint) if one is not NoneType) if is_optional else hint
-        found.append(Declared(each.name, kind, is_optional, field, each.default))
+        is_required = each.default is MISSING and each.default_factory is MISSING
+        found.append(Declared(each.name, kind, is_optional, field, is_required))
     return tuple(found)
 
 

@@ -3,57 +3,77 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Annotated
+
+from fingervision.domain.field import Field
 
 PointMm = tuple[float, float]
+SHORTEST_MM, LONGEST_MM = 1e-4, 1e5
+"""Lengths in a drawing: from 0.1 µm to 100 m; much larger numbers would overflow."""
+CHECK_UNIT = "check its unit"
+
+
+def _length(meaning: str) -> Field:
+    return Field(meaning, "mm", low=SHORTEST_MM, high=LONGEST_MM, hint=CHECK_UNIT)
+
+
+def _place(meaning: str) -> Field:
+    return Field(meaning, "mm", low=-LONGEST_MM, high=LONGEST_MM, hint=CHECK_UNIT)
+
+
+def _angle(meaning: str) -> Field:
+    return Field(meaning, "degrees", low=-720.0, high=720.0, hint=CHECK_UNIT)
 
 
 @dataclass(frozen=True, slots=True)
 class SNLine:
     """S-N line of fatigue: stress amplitude over number of cycles, a straight line with both axes logarithmic.
 
-    Parameters
-    ----------
-    cycles : (float, float)
-        Numbers of cycles at the start and end of the line, in ascending order; the line is not extrapolated.
-    amplitude_mpa : (float, float)
-        Stress amplitudes at the start and end of the line, in descending order.
-    stress_ratio : float
-        Ratio of the smallest to the largest stress in the tests from which the line was obtained; -1 for fully
-        reversed, 0 for pulsating stress.
+    The line is not extrapolated.
     """
 
-    cycles: tuple[float, float]
-    amplitude_mpa: tuple[float, float]
-    stress_ratio: float = -1.0
+    cycles: Annotated[
+        tuple[float, float], Field("numbers of cycles at the start and end of the line, ascending", low=1.0, high=1e12)
+    ]
+    amplitude_mpa: Annotated[
+        tuple[float, float],
+        Field("stress amplitudes at the start and end of the line, descending", "MPa", above=0.0, high=1e5),
+    ]
+    stress_ratio: Annotated[
+        float,
+        Field(
+            "smallest over largest stress in the tests of the line: -1 for fully reversed, 0 for pulsating stress",
+            low=-10.0,
+            below=1.0,
+        ),
+    ] = -1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """An isotropic elastic material.
+    """An isotropic elastic material."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the material.
-    youngs_modulus_mpa, poisson_ratio : float
-        Linear elastic constants.
-    density_kg_m3 : float
-        Density in kg/m^3.
-    yield_mpa : float
-        Yield stress, beyond which the result of an elastic model is invalid.
-    thermal_expansion_per_k : float or None
-        Coefficient of linear thermal expansion; None if not stated.
-    sn_line : SNLine or None
-        S-N line of fatigue; None if not stated.
-    """
-
-    name: str
-    youngs_modulus_mpa: float
-    poisson_ratio: float
-    density_kg_m3: float
-    yield_mpa: float
-    thermal_expansion_per_k: float | None = None
-    sn_line: SNLine | None = None
+    name: Annotated[str, Field("name of the material")]
+    youngs_modulus_mpa: Annotated[float, Field("Young's modulus", "MPa", low=1e-3, high=1e13, hint=CHECK_UNIT)]
+    poisson_ratio: Annotated[float, Field("Poisson's ratio", above=0.0, below=0.5)]
+    density_kg_m3: Annotated[
+        float, Field("density", "kg/m3", low=30.0, high=25000.0, hint="is it in g/cm3? Multiply it by 1000")
+    ]
+    yield_mpa: Annotated[
+        float,
+        Field(
+            "yield stress, beyond which the result of an elastic model is invalid",
+            "MPa",
+            low=1e-3,
+            high=1e13,
+            hint=CHECK_UNIT,
+        ),
+    ]
+    thermal_expansion_per_k: Annotated[
+        float | None,
+        Field("coefficient of linear thermal expansion, where known", "1/K", low=-1e-2, high=1e-2, hint=CHECK_UNIT),
+    ] = None
+    sn_line: Annotated[SNLine | None, Field("S-N line of fatigue, where known")] = None
 
     @property
     def shear_modulus_mpa(self) -> float:
@@ -68,104 +88,68 @@ class Material:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Overall dimensions of the plate, and the height at which the gap is measured.
+    """Overall dimensions of the plate, and the height at which the gap is measured."""
 
-    Parameters
-    ----------
-    width_mm, height_mm, plate_mm : float
-        Width across both halves, height above the clamp, thickness of the plate.
-    rest_gap_mm : float
-        Distance between the tips at rest.
-    measured_below_tip_mm : float
-        Distance of the measuring point below the top of the tip.
-    """
-
-    width_mm: float
-    height_mm: float
-    plate_mm: float
-    rest_gap_mm: float
-    measured_below_tip_mm: float
+    width_mm: Annotated[float, _length("width across both halves")]
+    height_mm: Annotated[float, _length("height above the clamp")]
+    plate_mm: Annotated[float, _length("thickness of the plate")]
+    rest_gap_mm: Annotated[float, _length("distance between the tips at rest")]
+    measured_below_tip_mm: Annotated[float, _length("distance of the measuring point below the top of the tip")]
 
 
 @dataclass(frozen=True, slots=True)
 class Hinge:
-    """A two-sided circular notch.
+    """A two-sided circular notch."""
 
-    Parameters
-    ----------
-    thickness_mm : float
-        Smallest thickness of material between the two notches.
-    radius_mm : float
-        Radius of the notches.
-    web_mm : float
-        Height of the bar into which the notches are cut; at least the thickness of the hinge.
-    """
+    thickness_mm: Annotated[float, _length("smallest thickness of material between the two notches")]
+    radius_mm: Annotated[float, _length("radius of the notches")]
+    web_mm: Annotated[
+        float, _length("height of the bar into which the notches are cut; at least the thickness of the hinge")
+    ]
 
-    thickness_mm: float
-    radius_mm: float
-    web_mm: float
+
+_LINKS = (
+    "link lengths as named by Hricko and Havlík (2015): hinge 2 lies at (-l2, -l1) from hinge 1, the drive point at "
+    "(-l4, -l3) from hinge 2"
+)
+_HINGES, _AXES = "positions of the hinges: centres of the notches", "angle of each hinge's longitudinal axis from x"
+_BLOCKS = "rectangles: x from, x to, y from, y to; the pillar is clamped at its lower face"
+_BARS = "bars: x and y of one end, and of the other end"
 
 
 @dataclass(frozen=True, slots=True)
 class Lever:
-    """Positions of hinges and drive in one half of the gripper; x from the symmetry axis, y up from the clamp (mm).
+    """Positions of hinges and drive in one half of the gripper; x from the symmetry axis, y up from the clamp (mm)."""
 
-    Parameters
-    ----------
-    l1_mm, l2_mm, l3_mm, l4_mm : float
-        Link lengths as named by Hricko and Havlik (2015): hinge 2 lies at (-l2, -l1) from hinge 1, and the drive point
-        at (-l4, -l3) from hinge 2.
-    hinge1_mm, hinge2_mm : (float, float)
-        Positions of the hinges: centres of the notches.
-    hinge1_axis_deg, hinge2_axis_deg : float
-        Angle of each hinge's longitudinal axis from the x axis.
-    drive_mm : (float, float)
-        Position of the drive point O_A on the symmetry axis.
-    drive_face_y_mm, drive_face_half_width_mm : float
-        Height and half width of the face on which the actuator pushes.
-    """
-
-    l1_mm: float
-    l2_mm: float
-    l3_mm: float
-    l4_mm: float
-    hinge1_mm: PointMm
-    hinge1_axis_deg: float
-    hinge2_mm: PointMm
-    hinge2_axis_deg: float
-    drive_mm: PointMm
-    drive_face_y_mm: float
-    drive_face_half_width_mm: float
+    l1_mm: Annotated[float, _place(_LINKS)]
+    l2_mm: Annotated[float, _place(_LINKS)]
+    l3_mm: Annotated[float, _place(_LINKS)]
+    l4_mm: Annotated[float, _place(_LINKS)]
+    hinge1_mm: Annotated[PointMm, _place(_HINGES)]
+    hinge1_axis_deg: Annotated[float, _angle(_AXES)]
+    hinge2_mm: Annotated[PointMm, _place(_HINGES)]
+    hinge2_axis_deg: Annotated[float, _angle(_AXES)]
+    drive_mm: Annotated[PointMm, _place("position of the drive point O_A on the symmetry axis")]
+    drive_face_y_mm: Annotated[float, _place("height of the face on which the actuator pushes")]
+    drive_face_half_width_mm: Annotated[float, _length("half width of that face")]
 
 
 @dataclass(frozen=True, slots=True)
 class Links:
-    """The bars and polygons whose union, minus the notches, is the right half of the body.
+    """The bars and polygons whose union, minus the notches, is the right half of the body."""
 
-    Parameters
-    ----------
-    pillar_and_root_mm, drive_block_mm : (float, float, float, float)
-        Axis-parallel rectangles: x from, x to, y from, y to. The pillar is clamped at its lower face.
-    shuttle_from_mm, shuttle_to_mm, shuttle_width_mm : (float, float), (float, float), float
-        Start point, end point and width of the bar from the drive point through hinge 2.
-    cross_bar_mm, finger_mm : (float, float, float, float)
-        Bars, each given by x and y of one end and x and y of the other end.
-    cross_bar_width_mm, finger_width_mm : float
-        Widths of the cross bar and the finger bar.
-    tip_polygon_mm : tuple of (float, float)
-        Corners of the tip; the inner face of the tip is the edge at the smallest x.
-    """
-
-    pillar_and_root_mm: tuple[float, float, float, float]
-    shuttle_from_mm: PointMm
-    shuttle_to_mm: PointMm
-    shuttle_width_mm: float
-    drive_block_mm: tuple[float, float, float, float]
-    cross_bar_mm: tuple[float, float, float, float]
-    cross_bar_width_mm: float
-    finger_mm: tuple[float, float, float, float]
-    finger_width_mm: float
-    tip_polygon_mm: tuple[PointMm, ...]
+    pillar_and_root_mm: Annotated[tuple[float, float, float, float], _place(_BLOCKS)]
+    shuttle_from_mm: Annotated[PointMm, _place("start of the bar from the drive point through hinge 2")]
+    shuttle_to_mm: Annotated[PointMm, _place("end of this bar")]
+    shuttle_width_mm: Annotated[float, _length("widths of the bars")]
+    drive_block_mm: Annotated[tuple[float, float, float, float], _place(_BLOCKS)]
+    cross_bar_mm: Annotated[tuple[float, float, float, float], _place(_BARS)]
+    cross_bar_width_mm: Annotated[float, _length("widths of the bars")]
+    finger_mm: Annotated[tuple[float, float, float, float], _place(_BARS)]
+    finger_width_mm: Annotated[float, _length("widths of the bars")]
+    tip_polygon_mm: Annotated[
+        tuple[PointMm, ...], _place("corners of the tip; its inner face is the edge at the smallest x")
+    ]
 
 
 @dataclass(frozen=True, slots=True)

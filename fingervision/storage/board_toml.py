@@ -43,9 +43,7 @@ def read_board(path: Path) -> BoardSettings:
     values, text = read_document(path, "board")
     top = Section(path, text, "", values)
     top.only(("schema", "port", "force_rate_hz", "silence_ms", "settle_ms", "lines"))
-    schema = top.whole("schema", low=1)
-    if schema != SCHEMA:
-        top.refuse("schema", f"must be {SCHEMA}, but is {schema}: this program is older than the file.")
+    top.schema(SCHEMA)
     port = top.word("port")
     if not port:
         top.refuse("port", "must be the name of a serial port, such as /dev/ttyACM0 or COM3, but is empty.")

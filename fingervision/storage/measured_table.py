@@ -12,8 +12,7 @@ from fingervision.domain.measured_table import MeasuredTable, RecordedPath
 from fingervision.storage.beside import response_note_beside, slots_beside, u_clock_beside
 from fingervision.storage.channel_columns import channel_names, channels_of
 from fingervision.storage.csv_columns import read_columns
-from fingervision.storage.iso230_table import Iso230Rows, read_iso230_table
-from fingervision.storage.number_columns import Numbers, numbers_in
+from fingervision.storage.number_columns import Numbers
 
 FEWEST_ROWS = 5
 PATH = ("input_mm", "time_s")
@@ -32,9 +31,6 @@ def read_measured_table(path: Path) -> MeasuredTable:
         A column is missing, a cell is not a number, there are fewer than five rows, the input or the gap never changes,
         or times repeat within a run.
     """
-    targets = read_iso230_table(path)
-    if targets is not None:
-        return targets_as_rows(path, targets)
     table = read_columns(path, NUMBERS[:2], NUMBERS[2:], ("run",), lambda names: channel_names(names, NUMBERS))
     values = {name: table.numbers(name) for name in NUMBERS if name in table}
     channels: dict[str, Numbers] = {}
@@ -45,13 +41,6 @@ def read_measured_table(path: Path) -> MeasuredTable:
         except DataError as error:
             said.append(f"the column {name} was left out: {error}")
     return measured_rows(path, values, table.texts("run"), said, channels=channels)
-
-
-def targets_as_rows(path: Path, targets: Iso230Rows, notes: Sequence[str] = ()) -> MeasuredTable:
-    """Convert a table of targets, cycles and directions to the rows of a measured table."""
-    cells = targets.cells()
-    values = {name: numbers_in(path, name, cells[name]) for name in NUMBERS if name in cells}
-    return measured_rows(path, values, cells.get("run"), (*notes, *targets.notes), count_rows=False)
 
 
 def measured_rows(

@@ -1,23 +1,53 @@
 """File of measurement settings, which the browser page saves and commands read by `--settings`."""
 
-import json
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import OutputError
+from fingervision.domain.field import Field, names_of
 from fingervision.storage.durable import replaced
 from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_text import toml_lines
 
-SCHEMA = 1
 TIPS = ("auto", *(direction.value for direction in Direction))
 POLARITIES = ("auto", "dark", "light")
-TOP_KEYS = ("schema", "calibration", "px_per_mm", "u_px_per_mm", "below_tip_mm", "tips", "roi", "fingers", "camera")
-CAMERA_NUMBERS = ("rate_hz", "exposure_ms", "gain", "focus", "white_balance_k")
-CAMERA_KEYS = (*CAMERA_NUMBERS, "size", "pixel_format")
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSettings:
+    """The section [camera]."""
+
+    rate_hz: Annotated[float | None, Field("frames per second", "Hz")] = None
+    exposure_ms: Annotated[float | None, Field("exposure time", "ms")] = None
+    gain: Annotated[float | None, Field("gain, in the unit of the camera")] = None
+    focus: Annotated[float | None, Field("focus, in the unit of the camera")] = None
+    white_balance_k: Annotated[float | None, Field("colour temperature of white", "K")] = None
+    size: Annotated[str | None, Field("width and height of the picture, as `640x480`")] = None
+    pixel_format: Annotated[str | None, Field("name of the pixel format")] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The file settings.toml."""
+
+    schema: Annotated[int, Field("1", low=1, high=1)]
+    calibration: Annotated[
+        str | None, Field("the scale: name of a calibration file, relative to `settings.toml`; or `px_per_mm`")
+    ] = None
+    px_per_mm: Annotated[float | None, Field("the scale as a number", "px/mm", above=0.0)] = None
+    u_px_per_mm: Annotated[float | None, Field("standard uncertainty of `px_per_mm`", "px/mm", above=0.0)] = None
+    below_tip_mm: Annotated[float | None, Field("as the option of `measure`", "mm", above=0.0)] = None
+    tips: Annotated[str | None, Field("as the option of `measure`", of=TIPS)] = None
+    roi: Annotated[
+        tuple[int, int, int, int] | None, Field("region [x, y, width, height] in the picture", "px", low=0)
+    ] = None
+    fingers: Annotated[str | None, Field("as the option of `measure`", of=POLARITIES)] = None
+    camera: Annotated[CameraSettings | None, Field("settings of the camera (table below)")] = None
 
 
 def read_settings(path: Path) -> dict[str, Any]:
@@ -41,37 +71,25 @@ def read_settings(path: Path) -> dict[str, Any]:
     """
     values, text = read_document(path, "settings")
     top = Section(path, text, "", values)
-    top.only(TOP_KEYS)
-    if top.values.get("schema") != SCHEMA:
-        top.refuse("schema", f"must be {SCHEMA}, but is {top.values.get('schema')}.")
-    if "calibration" in values and "px_per_mm" in values:
+    settings = top.record(Settings)
+    if settings.calibration is not None and settings.px_per_mm is not None:
         top.refuse("px_per_mm", "and calibration both give the scale: leave one out.")
-    found: dict[str, Any] = {}
-    if "calibration" in values:
-        found["calibration"] = path.parent / top.word("calibration")
-    if "px_per_mm" in values:
-        found["px_per_mm"] = top.number("px_per_mm", above=0.0)
-    if "u_px_per_mm" in values:
-        if "px_per_mm" not in values:
-            top.refuse("u_px_per_mm", "needs the scale whose uncertainty it is: add px_per_mm.")
-        found["u_px_per_mm"] = top.number("u_px_per_mm", above=0.0)
-    if "below_tip_mm" in values:
-        found["below_tip_mm"] = top.number("below_tip_mm", above=0.0)
-    if "tips" in values:
-        found["tips"] = top.word("tips", of=TIPS)
-    if "fingers" in values:
-        found["fingers"] = top.word("fingers", of=POLARITIES)
-    if "roi" in values:
-        box = values["roi"]
-        if not (isinstance(box, list) and len(box) == 4 and all(type(side) is int and side >= 0 for side in box)):
-            top.refuse("roi", f"must be four whole numbers [x, y, width, height], but is {box}.")
-        found["roi"] = ",".join(str(side) for side in box)
-    if "camera" in values:
-        camera = top.table("camera")
-        camera.only(CAMERA_KEYS)
-        found["camera"] = {name: camera.number(name) for name in CAMERA_NUMBERS if name in camera.values}
-        found["camera"] |= {name: camera.word(name) for name in ("size", "pixel_format") if name in camera.values}
+    if settings.u_px_per_mm is not None and settings.px_per_mm is None:
+        top.refuse("u_px_per_mm", "needs the scale whose uncertainty it is: add px_per_mm.")
+    found = _stated(settings)
+    del found["schema"]
+    if settings.calibration is not None:
+        found["calibration"] = path.parent / settings.calibration
+    if settings.roi is not None:
+        found["roi"] = ",".join(map(str, settings.roi))
+    if settings.camera is not None:
+        found["camera"] = _stated(settings.camera)
     return found
+
+
+def _stated(record: Any) -> dict[str, Any]:
+    """Fields of a record that have a value."""
+    return {name: value for name in names_of(record) if (value := getattr(record, name)) is not None}
 
 
 def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
@@ -89,20 +107,13 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
     OutputError
         The file or folder cannot be written.
     """
-    lines = [
-        "# For `fingervision live SOURCE --settings FILE`, and for `measure`.",
-        f"schema = {SCHEMA}",
-    ]
-    for key in TOP_KEYS[1:-1]:
-        value = settings.get(key)
-        if value is None:
-            continue
-        if isinstance(value, Path):
-            value = Path(os.path.relpath(value.resolve(), path.parent.resolve())).as_posix()
-        lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
+    named = {name: settings.get(name) for name in names_of(Settings)} | {"schema": 1, "camera": None}
+    if named["calibration"] is not None:
+        relative = os.path.relpath(named["calibration"].resolve(), path.parent.resolve())
+        named["calibration"] = Path(relative).as_posix()
+    lines = ["# For `fingervision live SOURCE --settings FILE`, and for `measure`.", *toml_lines(named)]
     camera = {key: value for key, value in (settings.get("camera") or {}).items() if value is not None}
-    if camera:
-        lines += ["", "[camera]", *(f"{key} = {json.dumps(value)}" for key, value in camera.items())]
+    lines += toml_lines(camera, "[camera]") if camera else []
     text = in_utf8(path, "\n".join(lines) + "\n")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -20,17 +20,40 @@ deceleration_mm_s2 = 500.0
 """
 
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated
 
 from fingervision.domain.errors import DataError, OutputError
+from fingervision.domain.field import Field, names_of
 from fingervision.domain.step_data import MOST_STEPS, Coordinates, CycleTime, Operation, SpeedEntry, Step, StepData
 from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_text import toml_lines
 
 SCHEMA = 1
-_SPEED_KEYS = ("speed_mm_s", "acceleration_mm_s2", "deceleration_mm_s2")
-_STEP_KEYS = (
-    "number", "target_mm", "coordinates", "operation", "pushing_force_n", "load_kg", "positioning_time_s", *_SPEED_KEYS,
-)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class StepTable:
+    """A table [[step]] as it stands in the file."""
+
+    target_mm: Annotated[float, Field("position, or displacement if the coordinates are relative", "mm")]
+    load_kg: Annotated[float, Field("moved mass", "kg", above=0.0)]
+    number: Annotated[int | None, Field("number of the block; the next one by default", low=1, high=MOST_STEPS)] = None
+    coordinates: Annotated[Coordinates, Field("`absolute` or `relative`; absolute by default")] = Coordinates.ABSOLUTE
+    operation: Annotated[Operation, Field("`moving`, or `pushing` with `pushing_force_n`; moving by default")] = (
+        Operation.MOVING
+    )
+    pushing_force_n: Annotated[float | None, Field("force of pushing", "N", above=0.0)] = None
+    positioning_time_s: Annotated[
+        float | None, Field("cycle-time entry: time from the start of the motion to rest", "s", above=0.0)
+    ] = None
+    speed_mm_s: Annotated[float | None, Field("speed entry: constant speed", "mm/s", above=0.0)] = None
+    acceleration_mm_s2: Annotated[float | None, Field("speed entry: accelerations", "mm/s2", above=0.0)] = None
+    deceleration_mm_s2: Annotated[float | None, Field("speed entry: accelerations", "mm/s2", above=0.0)] = None
+
+
+_SPEED_KEYS = names_of(SpeedEntry)
 
 
 def read_steps(path: Path) -> StepData:
@@ -44,9 +67,7 @@ def read_steps(path: Path) -> StepData:
     values, text = read_document(path, "step data")
     top = Section(path, text, "", values)
     top.only(("schema", "name", "start_mm", "sequence", "step"))
-    schema = top.whole("schema", low=1)
-    if schema != SCHEMA:
-        top.refuse("schema", f"must be {SCHEMA}, but is {schema}: this program is older than the file.")
+    top.schema(SCHEMA)
     sections = top.tables("step")
     if not 1 <= len(sections) <= MOST_STEPS:
         raise DataError(
@@ -55,10 +76,13 @@ def read_steps(path: Path) -> StepData:
         )
     steps: dict[int, Step] = {}
     for section in sections:
-        number = section.whole("number", max(steps, default=0) + 1, low=1, high=MOST_STEPS)
+        table = section.record(StepTable)
+        number = table.number or max(steps, default=0) + 1
         if number in steps:
             section.refuse("number", f"must differ from the numbers of all earlier steps, but {number} occurs twice.")
-        steps[number] = _step(section)
+        if number > MOST_STEPS:
+            section.refuse("number", f"must be at most {MOST_STEPS}, but is {number}.")
+        steps[number] = _step(section, table)
     return StepData(
         name=top.word("name", path.stem),
         steps=dict(sorted(steps.items())),
@@ -75,67 +99,48 @@ def _sequence(top: Section, steps: Mapping[int, Step]) -> tuple[int, ...]:
     return tuple(raw)
 
 
-def _step(section: Section) -> Step:
-    section.only(_STEP_KEYS)
-    operation = Operation(section.word("operation", Operation.MOVING.value, of=[each.value for each in Operation]))
-    if operation is Operation.MOVING and "pushing_force_n" in section.values:
+def _step(section: Section, table: StepTable) -> Step:
+    pushing = table.operation is Operation.PUSHING
+    if not pushing and table.pushing_force_n is not None:
         section.refuse("pushing_force_n", 'must come with operation = "pushing", but the operation is moving.')
-    pushing = operation is Operation.PUSHING
+    if pushing and table.pushing_force_n is None:
+        section.refuse(None, "must state pushing_force_n, but does not: add it.")
     return Step(
-        target_mm=section.number("target_mm"),
-        load_kg=section.number("load_kg", above=0.0),
-        entry=_entry(section),
-        coordinates=Coordinates(
-            section.word("coordinates", Coordinates.ABSOLUTE.value, of=[each.value for each in Coordinates])
-        ),
-        operation=operation,
-        pushing_force_n=section.number("pushing_force_n", above=0.0) if pushing else None,
-    )
+        table.target_mm, table.load_kg, _entry(section, table), table.coordinates, table.operation,
+        table.pushing_force_n,
+    )  # fmt: skip
 
 
-def _entry(section: Section) -> CycleTime | SpeedEntry:
-    timed = "positioning_time_s" in section.values
-    speeds = [key for key in _SPEED_KEYS if key in section.values]
-    if timed and speeds:
+def _entry(section: Section, table: StepTable) -> CycleTime | SpeedEntry:
+    speeds = {key: getattr(table, key) for key in _SPEED_KEYS if getattr(table, key) is not None}
+    if table.positioning_time_s is not None and speeds:
         section.refuse(
-            speeds[0],
+            next(iter(speeds)),
             "must not be given together with positioning_time_s, which determines it: leave one of the two out.",
         )
-    if timed:
-        return CycleTime(section.number("positioning_time_s", above=0.0))
+    if table.positioning_time_s is not None:
+        return CycleTime(table.positioning_time_s)
+    missing = [key for key in _SPEED_KEYS if key not in speeds]
     if not speeds:
         section.refuse(None, f"must state positioning_time_s, or {', '.join(_SPEED_KEYS)}, but states neither.")
-    return SpeedEntry(*(section.number(key, above=0.0) for key in _SPEED_KEYS))
+    if missing:
+        section.refuse(None, f"must state {missing[0]}, but does not: add it.")
+    return SpeedEntry(**speeds)
 
 
 def write_steps(path: Path, data: StepData) -> None:
     """Write step data to a file, from which they can be read back exactly."""
-    lines = [
-        f"schema = {SCHEMA}", f"name = {_text(data.name)}", f"start_mm = {data.start_mm!r}",
-        f"sequence = {list(data.sequence)}",
-    ]  # fmt: skip
+    top = {"schema": SCHEMA, "name": data.name, "start_mm": data.start_mm, "sequence": data.sequence}
+    lines = toml_lines(top)
     for number, step in sorted(data.steps.items()):
-        lines += [
-            "", "[[step]]", f"number = {number}", f"target_mm = {step.target_mm!r}",
-            f'coordinates = "{step.coordinates}"', f'operation = "{step.operation}"',
-        ]  # fmt: skip
-        if step.pushing_force_n is not None:
-            lines.append(f"pushing_force_n = {step.pushing_force_n!r}")
-        lines.append(f"load_kg = {step.load_kg!r}")
-        if isinstance(step.entry, CycleTime):
-            lines.append(f"positioning_time_s = {step.entry.positioning_time_s!r}")
-        else:
-            lines += [f"{key} = {getattr(step.entry, key)!r}" for key in _SPEED_KEYS]
+        stated = {
+            "number": number, "target_mm": step.target_mm, "coordinates": step.coordinates,
+            "operation": step.operation, "pushing_force_n": step.pushing_force_n, "load_kg": step.load_kg,
+        }  # fmt: skip
+        lines += toml_lines(stated | asdict(step.entry), "[[step]]")
     try:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
         raise OutputError(
             f"The step data of the motor controller could not be written to {path} ({error.strerror})."
         ) from error
-
-
-def _text(words: str) -> str:
-    """Quote a text for TOML with JSON escapes, which are valid in TOML except for the control character DEL."""
-    import json
-
-    return json.dumps(words, ensure_ascii=False).replace("\x7f", "\\u007f")

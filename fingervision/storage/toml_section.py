@@ -4,13 +4,17 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
+from enum import Enum
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar, get_args, get_origin
 
 from fingervision.domain.errors import DataError, InputFileError
+from fingervision.domain.field import Declared, Field, declared
 from fingervision.storage.number_columns import is_number
 from fingervision.storage.plain_file import NotUtf8Error, parsed, text_of
+
+Record = TypeVar("Record")
 
 
 def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
@@ -84,6 +88,9 @@ class Section:
         Values of the table by key.
     place : int
         Index, from 0, of the table among those with the same header.
+    uncertainties : dict of str to float, or None
+        Where not None, a number may be written `{ value = 1.0, u = 0.1 }`; its standard uncertainty is put here, by
+        its dotted name.
     """
 
     path: Path
@@ -91,16 +98,23 @@ class Section:
     header: str
     values: Mapping[str, Any]
     place: int = 0
+    uncertainties: dict[str, float] | None = None
 
     def at(self, key: str | None = None) -> str:
-        """Location of a key: `line 12 of recipe.toml`."""
+        """Location of a key: `line 12 of recipe.toml`; the file alone if its text is not known."""
+        if not self.text:
+            return str(self.path)
         return f"line {line_of(self.text, self.header, self.place, key)} of {self.path}"
+
+    def dotted(self, key: str) -> str:
+        """Name of a key with that of its table."""
+        return f"{self.header}.{key}" if self.header else key
 
     def refuse(self, key: str | None, words: str) -> NoReturn:
         """Raise an error that begins with the key and states its location."""
         if key is None and not self.header:
             raise DataError(f"{self.path} {words}")
-        name = key if key is not None else f"[{self.header}]"
+        name = f"[{self.header}]" if key is None else key if self.text else self.dotted(key)
         raise DataError(f"{name} in {self.at(key)} {words}")
 
     def only(self, keys: Iterable[str]) -> None:
@@ -112,23 +126,30 @@ class Section:
                 hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}."
                 self.refuse(key, f"is not known: {hint}")
 
+    def schema(self, newest: int, default: int | None = None) -> None:
+        """Refuse a file whose schema number is higher than the newest that this program reads."""
+        if (stated := self.whole("schema", default, low=1)) > newest:
+            self.refuse("schema", f"must be at most {newest}, but is {stated}: use a newer fingervision.")
+
     def number(
         self, key: str, default: float | None = None, *, low: float = -float("inf"), high: float = float("inf"),
         above: float | None = None,
     ) -> float:  # fmt: skip
         """Read a finite number between limits (`above`: greater than); without a default the key is required."""
+        limits = Field(low=low, high=high, above=-float("inf") if above is None else above)
+        return self._number(key, self._stated(key, default), limits)
+
+    def _stated(self, key: str, default: Any = None) -> Any:
         value = self.values.get(key, default)
         if value is None:
             self.refuse(None, f"must state {key}, but does not: add it.")
+        return value
+
+    def _number(self, key: str, value: Any, field: Field) -> float:
         if not is_number(value):
             self.refuse(key, f"must be a number, but is {value!r}.")
-        if above is not None and not value > above:
-            self.refuse(key, f"must be greater than {above:g}, but is {value:g}.")
-        if not low <= value <= high:
-            limits = f"between {low:g} and {high:g}" if high < float("inf") else f"at least {low:g}"
-            if low == -float("inf"):
-                limits = f"at most {high:g}"
-            self.refuse(key, f"must be {limits}, but is {value:g}.")
+        if (words := field.refusal(value)) is not None:
+            self.refuse(key, f"{words}.")
         return float(value)
 
     def whole(self, key: str, default: int | None = None, *, low: int, high: int = 1_000_000) -> int:
@@ -140,9 +161,7 @@ class Section:
 
     def word(self, key: str, default: str | None = None, *, of: Iterable[str] | None = None) -> str:
         """Read a text; if `of` is given, the text must be one of these words."""
-        value = self.values.get(key, default)
-        if value is None:
-            self.refuse(None, f"must state {key}, but does not: add it.")
+        value = self._stated(key, default)
         if not isinstance(value, str):
             self.refuse(key, f"must be a text, but is {value!r}.")
         if of is not None and value not in (known := list(of)):
@@ -163,12 +182,79 @@ class Section:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             self.refuse(key, f"must be a table [{key}], but is {value!r}.")
-        return Section(self.path, self.text, f"{self.header}.{key}" if self.header else key, value)
+        return Section(self.path, self.text, self.dotted(key), value, 0, self.uncertainties)
 
     def tables(self, key: str) -> tuple["Section", ...]:
         """Read the sub-tables `[[key]]`, in order."""
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
             self.refuse(key, f"must be tables [[{key}]], but is {value!r}.")
-        header = f"{self.header}.{key}" if self.header else key
-        return tuple(Section(self.path, self.text, header, each, place) for place, each in enumerate(value))
+        return tuple(
+            Section(self.path, self.text, self.dotted(key), each, place, self.uncertainties)
+            for place, each in enumerate(value)
+        )
+
+    def record(self, kind: type[Record]) -> Record:
+        """Read the table as a record (a dataclass) whose declared fields are its keys; nested records are sub-tables.
+
+        Raises
+        ------
+        DataError
+            A key is unknown or missing, or its value is not one of the declared kind and limits.
+        """
+        fields = declared(kind)
+        self.only([each.name for each in fields])
+        given = [each for each in fields if self.values.get(each.name) is not None or each.is_required]
+        return kind(**{each.name: self._value(each) for each in given})
+
+    def _value(self, each: Declared) -> Any:
+        key, kind, field = each.name, each.kind, each.field
+        if is_dataclass(kind):
+            if key not in self.values and not each.is_optional:
+                self.refuse(None, f"must have a section [{self.dotted(key)}], but has none.")
+            return self.table(key).record(kind)
+        if get_origin(kind) is tuple and is_dataclass(inner := get_args(kind)[0]):
+            return tuple(section.record(inner) for section in self.tables(key))
+        if get_origin(kind) is tuple:
+            return self._tuple(key, self._stated(key), kind, field)
+        if kind is bool:
+            return self.flag(key)
+        if isinstance(kind, type) and issubclass(kind, Enum):
+            return kind(self.word(key, of=[one.value for one in kind]))
+        if kind is str:
+            return self.word(key, of=field.of or None)
+        value = self._stated(key)
+        if isinstance(value, dict) and self.uncertainties is not None:
+            value = self._uncertain(key, value)
+        return self._one(key, value, kind, field)
+
+    def _uncertain(self, key: str, value: dict[str, Any]) -> Any:
+        """Note the uncertainty of a number `{ value, u }`, and return the number."""
+        if set(value) != {"value", "u"}:
+            self.refuse(key, f"must be a number or {{value = ..., u = ...}}, but has the keys {', '.join(value)}.")
+        u = self._number(f"{key}.u", value["u"], Field(low=0.0))
+        if self.uncertainties is not None:
+            self.uncertainties[self.dotted(key)] = u
+        return value["value"]
+
+    def _tuple(self, key: str, value: Any, kind: Any, field: Field) -> tuple[Any, ...]:
+        """Read a list: numbers, or points of numbers (`tuple[Point, ...]`)."""
+        inner = get_args(kind)
+        if Ellipsis in inner:
+            if not isinstance(value, list):
+                self.refuse(key, f"must be a list, but is {value!r}.")
+            if get_origin(inner[0]) is tuple:
+                return tuple(self._tuple(key, each, inner[0], field) for each in value)
+            inner = (inner[0],) * len(value)
+        if isinstance(value, dict) and self.uncertainties is not None:
+            self.refuse(key, "is a list and can have no uncertainty: state it at a single number.")
+        if not isinstance(value, list) or len(value) != len(inner):
+            self.refuse(key, f"must be a list of {len(inner)} numbers, but is {value!r}.")
+        return tuple(self._one(key, each, one, field) for one, each in zip(inner, value, strict=True))
+
+    def _one(self, key: str, value: Any, kind: Any, field: Field) -> Any:
+        """Read a number of a kind."""
+        number = self._number(key, value, field)
+        if kind is int and number != int(number):
+            self.refuse(key, f"must be a whole number, but is {value:g}.")
+        return kind(number)

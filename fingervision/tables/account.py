@@ -16,7 +16,7 @@ from fingervision.tables.column_names import DIMENSION, column_name
 from fingervision.tables.formats import read_raw
 from fingervision.tables.iso230 import iso230_rows_of
 from fingervision.tables.mapping import KINDS, Entry
-from fingervision.tables.own_format import TARGET, is_own
+from fingervision.tables.own_format import is_own
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawTable
 from fingervision.tables.read import drive_of, read_drive, read_measured_table, read_simulation_table
@@ -291,7 +291,7 @@ def _own(path: Path, kind: str) -> Account:
     roles = [role for role in (*NEEDED[kind], "time") if role in columns]
     taken = tuple(Taken(CANONICAL[role], role, CANONICAL[role].rsplit("_", 1)[1]) for role in dict.fromkeys(roles))
     rows = max((each.value.size for each in columns.values()), default=0)
-    what = f"the project's own format, by its columns {TARGET if not taken else ', '.join(t.name for t in taken)}"
+    what = f"the project's own format, by its columns {', '.join(t.name for t in taken)}"
     return Account(
         path, kind, what, own=True, taken=taken, unused=(), columns=columns, rows=rows,
         rate_hz=_rate(columns.get("time")), left_out=(), notes=notes, question=question, entry=Entry(),

@@ -6,7 +6,6 @@ from fingervision.storage.csv_columns import header_of
 from fingervision.tables.mapping import Entry
 
 OWN = {"measured": ("input_mm", "gap_mm"), "drive": ("time_s", "input_mm"), "simulation": ("input_mm", "gap_mm")}
-TARGET = "target_mm"
 
 
 def is_own(path: Path, kind: str, given: Entry) -> bool:
@@ -19,8 +18,4 @@ def is_own(path: Path, kind: str, given: Entry) -> bool:
     if not path.is_file():
         return True
     names = header_of(path)
-    if kind == "measured" and TARGET in names and "input_mm" not in names:
-        from fingervision.storage.iso230_table import MATRIX, QUANTITIES
-
-        return any(name in QUANTITIES or MATRIX.fullmatch(name) for name in names)
     return all(name in names for name in OWN[kind])

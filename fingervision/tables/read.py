@@ -49,7 +49,7 @@ def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTabl
     raw = read_raw(path, given)
     targets = iso230_rows_of(raw, given)
     if targets is not None:
-        return measured_table.targets_as_rows(path, targets, said(given, raw.what, raw.notes, raw.left_out))
+        return targets.table(path, said(given, raw.what, raw.notes, raw.left_out))
     table = understand(raw, "measured", given).decided()
     values = {CANONICAL[role]: numbers for role, numbers in table.columns.items()}
     if "gap_mm" not in values:

@@ -20,9 +20,8 @@ from fingervision.diagnosis.report.positioning_of_data import (
 )
 from fingervision.diagnosis.report.positioning_report import PositioningReport
 from fingervision.motion.repeated_targets import NoRepeatedTargets
-from fingervision.storage.iso230_table import read_iso230_table
-from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
+from fingervision.tables.read import read_measured_table
 
 RIGS = Path(__file__).parents[3] / "shared" / "real" / "rigs"
 PATH = np.tile(np.concatenate([[-0.5], np.arange(5.0), [4.5], np.arange(5.0)[::-1]]), 5)
@@ -140,12 +139,10 @@ def test_a_diagnosed_table_of_targets_tells_the_play(tmp_path: Path) -> None:
     for cycle in range(1, 6):
         for side, word in ((1, "up"), (-1, "down")):
             lines += [f"{t},{cycle},{word},{-10.0 * side + rng.normal():.3f}" for t in np.linspace(-3.0, 3.0, 7)]
-    targets, rows, model = (tmp_path / name for name in ("targets.csv", "measured.csv", "simulation.csv"))
+    targets, model = (tmp_path / name for name in ("targets.csv", "simulation.csv"))
     targets.write_text("\n".join(lines) + "\n")
     model.write_text("input_mm,gap_mm\n-4,-4\n4,4\n")
-    cells = read_iso230_table(targets).cells()
-    rows.write_text("\n".join([",".join(cells), *(",".join(row) for row in zip(*cells.values(), strict=True))]) + "\n")
-    done = diagnose(read_measured_table(rows), read_model(model))
+    done = diagnose(read_measured_table(targets), read_model(model))
     answer = {e.name: {name: known.value for name, known in e.parameters.items()} for e in done.report.effects}
     found = positioning_of_data(done.data, answer)
     assert found.cycles == (5, 5)

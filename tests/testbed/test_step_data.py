@@ -139,7 +139,7 @@ def test_a_time_too_short_is_answered_with_the_shortest_and_that_is_enough(tmp_p
          'pushing_force_n in line 11 of {path} must come with operation = "pushing", but the operation is '
          "moving."),
         ("load_kg = 0.2", "load_kg = 0",
-         "load_kg in line 5 of {path} must be greater than 0, but is 0."),
+         "load_kg in line 5 of {path} must be greater than 0 kg, but is 0."),
         ("target_mm = 5.0", "number = 16\ntarget_mm = 5.0",
          "number in line 4 of {path} must be between 1 and 15, but is 16."),
         ("target_mm = 0.5", "number = 1\ntarget_mm = 0.5",
@@ -150,7 +150,7 @@ def test_a_time_too_short_is_answered_with_the_shortest_and_that_is_enough(tmp_p
         ("target_mm = 5.0", "taget_mm = 5.0",
          "taget_mm in line 4 of {path} is not known: did you mean target_mm?"),
         ("schema = 1", "schema = 2",
-         "schema in line 1 of {path} must be 1, but is 2: this program is older than the file."),
+         "schema in line 1 of {path} must be at most 1, but is 2: use a newer fingervision."),
     ],
 )  # fmt: skip
 def test_what_cannot_be_done_is_said_in_a_sentence(old: str, new: str, said: str, tmp_path: Path) -> None:
