@@ -209,12 +209,15 @@ class Section:
 
     def _value(self, each: Declared) -> Any:
         key, kind, field = each.name, each.kind, each.field
+        # The type checker takes a type that `is_dataclass` accepted for a record or its type.
+        inner: Any = next(iter(get_args(kind)), None)
+        nested: Any = kind if is_dataclass(kind) else inner
         if is_dataclass(kind):
             if key not in self.values and not each.is_optional:
                 self.refuse(None, f"must have a section [{self.dotted(key)}], but has none.")
-            return self.table(key).record(kind)
-        if get_origin(kind) is tuple and is_dataclass(inner := get_args(kind)[0]):
-            return tuple(section.record(inner) for section in self.tables(key))
+            return self.table(key).record(nested)
+        if get_origin(kind) is tuple and is_dataclass(inner):
+            return tuple(section.record(nested) for section in self.tables(key))
         if get_origin(kind) is tuple:
             return self._tuple(key, self._stated(key), kind, field)
         if kind is bool:
