@@ -10,13 +10,11 @@ whereas a wrong checksum rejects a whole cluster; for them a wrong checksum only
 Source: RFC 9559 (Matroska), 5.1.3 (clusters); RFC 8794 (EBML), 11.3.1 (CRC-32: of ISO 3309, little-endian).
 """
 
-import mmap
 from binascii import crc32
 from bisect import bisect_right
 from pathlib import Path
-from typing import BinaryIO
 
-from fingervision.frames.ebml import element
+from fingervision.frames.ebml import FileBytes, element
 from fingervision.frames.matroska_times import CLUSTER
 
 CHECKSUM = b"\xbf"
@@ -44,8 +42,8 @@ class ClusterChecksums:
         self.cover_all = False
         """Whether every cluster has a checksum that agrees with its bytes."""
         try:
-            with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-                self._read(content, file)
+            with path.open("rb") as file:
+                self._read(FileBytes(file))
         except (OSError, ValueError):
             return
 
@@ -61,7 +59,7 @@ class ClusterChecksums:
         """Whether a cluster of a file with checksums has a wrong one, or none."""
         return self.are_stated and not self.cover_all
 
-    def _read(self, content: mmap.mmap, file: BinaryIO) -> None:
+    def _read(self, content: FileBytes) -> None:
         at, clusters = content.find(CLUSTER), 0
         while at >= 0:
             clusters += 1
@@ -69,16 +67,14 @@ class ClusterChecksums:
             if cluster is not None:
                 stated = _stated(content, cluster.begin)
                 self.are_stated = self.are_stated or stated is not None
-                # Pages read through the map would stay in memory, as many as the file has.
-                file.seek(cluster.begin + ELEMENT_BYTES)
-                if stated is not None and crc32(file.read(max(0, cluster.end - file.tell()))) == stated:
+                if stated is not None and crc32(content[cluster.begin + ELEMENT_BYTES : cluster.end]) == stated:
                     self._sound.append((at, cluster.end))
                     end = cluster.end
             at = content.find(CLUSTER, end)
         self.cover_all = self.are_stated and clusters == len(self._sound)
 
 
-def _stated(content: mmap.mmap, at: int) -> int | None:
+def _stated(content: FileBytes, at: int) -> int | None:
     """Checksum at the beginning of a cluster; None if the cluster has no checksum."""
     first = element(content, at)
     if first is None or first.name != CHECKSUM or first.end - first.begin != CHECKSUM_BYTES:

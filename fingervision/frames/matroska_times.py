@@ -9,14 +9,13 @@ duration.
 Source: RFC 9559 (Matroska), 5.1.3 (clusters), 5.1.5 (cues).
 """
 
-import mmap
 import struct
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from fingervision.frames.ebml import child, children, element, number
+from fingervision.frames.ebml import FileBytes, child, children, element, number
 
 SEGMENT, CLUSTER, CUES, INFO = b"\x18\x53\x80\x67", b"\x1f\x43\xb6\x75", b"\x1c\x53\xbb\x6b", b"\x15\x49\xa9\x66"
 TIMESTAMP, SIMPLE_BLOCK, BLOCK_GROUP, BLOCK = b"\xe7", b"\xa3", b"\xa0", b"\xa1"
@@ -50,7 +49,8 @@ class ClusterTimes:
         self._begins: list[int] = []
         self._doubtful: list[bool] = []
         try:
-            with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+            with path.open("rb") as file:
+                content = FileBytes(file)
                 track = _track(content, stream)
                 clusters = _clusters(content, track)
                 cues, duration = _cues(content, track), _duration(content)
@@ -65,7 +65,7 @@ class ClusterTimes:
         return at >= 0 and self._doubtful[at]
 
 
-def _track(content: mmap.mmap, stream: int) -> int:
+def _track(content: FileBytes, stream: int) -> int:
     """Track number in the blocks of a stream; streams are counted in the order of their tracks."""
     at = content.find(TRACKS)
     while at >= 0:
@@ -98,14 +98,13 @@ def _doubtful(clusters: list[_Cluster], cues: dict[int, set[int]], duration: flo
     return doubtful
 
 
-def _clusters(content: mmap.mmap, track: int) -> list[_Cluster]:
+def _clusters(content: FileBytes, track: int) -> list[_Cluster]:
     found: list[_Cluster] = []
     at = content.find(CLUSTER)
     while at >= 0:
         whole = element(content, at)
-        behind = content.find(CLUSTER, at + 4)
         if whole is None:
-            at = behind
+            at = content.find(CLUSTER, at + 4)
             continue
         cluster, time = _Cluster(at), None
         inside = whole.begin
@@ -127,7 +126,7 @@ def _clusters(content: mmap.mmap, track: int) -> list[_Cluster]:
     return found
 
 
-def _cues(content: mmap.mmap, track: int) -> dict[int, set[int]]:
+def _cues(content: FileBytes, track: int) -> dict[int, set[int]]:
     """Times stated in the file's index, for each position of a cluster."""
     stated: dict[int, set[int]] = {}
     segment, at = content.find(SEGMENT), content.rfind(CUES)
@@ -152,7 +151,7 @@ def _cues(content: mmap.mmap, track: int) -> dict[int, set[int]]:
     return stated
 
 
-def _duration(content: mmap.mmap) -> float | None:
+def _duration(content: FileBytes) -> float | None:
     """Duration in ticks; None if it is not stated."""
     at = content.find(INFO)
     while at >= 0:  # the name also occurs in the file's table of contents

@@ -16,8 +16,10 @@ from fingervision.motion.clock.clock_offset import ClockOffset
 from fingervision.storage.durable import replaced
 
 SIZE_INCHES, DOTS_PER_INCH = (9.0, 5.5), 130
-# Largest number of points that can be distinguished in the figure; with more points, each column shows its range.
-MOST_POINTS = 2000
+# Largest number of points that can be distinguished in the figure, about one for each of its columns of pixels; with
+# more points, each column shows its range. A line through more points also needs memory: 15 kB for each point, where
+# the gap jumps from frame to frame, while the picture is drawn (a benchmark of memory prints it).
+MOST_POINTS = 1000
 COVERAGE_FACTOR = 2.0
 GAP_COLOUR, BAND_COLOUR, FAILURE_COLOUR = "#11507a", "#8fbcdb", "#c0392b"
 INPUT_COLOUR = "#9a5b00"
