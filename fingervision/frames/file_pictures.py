@@ -63,7 +63,7 @@ class AviPlaces:
     def __init__(self, path: Path, stream: int, streams: int) -> None:
         self._path, self._tag = path, b"%02d" % stream
         with path.open("rb") as file:
-            begin = file.read(HEAD_BYTES).find(b"movi")
+            begin = _list_of_pictures(file.read(HEAD_BYTES))
             self._offsets, self._sizes, self._most_missing = _index(file, self._tag, begin, streams)
         self.after_hole = False
         """Whether bytes are missing between the starts of the last two packets, so that the first of the two may be
@@ -143,6 +143,17 @@ class AviPlaces:
                     number += 1
                 at += HEADER_BYTES + length + length % 2
         return None
+
+
+def _list_of_pictures(head: bytes) -> int:
+    """Position of the word `movi`; -1 if the chunks before it do not lead there, because damage has moved the word."""
+    at = 12  # behind `RIFF`, its length, and `AVI `
+    while at + HEADER_BYTES < len(head):
+        if head[at : at + 4] == b"LIST" and head[at + HEADER_BYTES : at + HEADER_BYTES + 4] == b"movi":
+            return at + HEADER_BYTES
+        length = int.from_bytes(head[at + 4 : at + HEADER_BYTES], "little")
+        at += HEADER_BYTES + length + length % 2
+    return -1
 
 
 def _index(file: BinaryIO, tag: bytes, begin: int, streams: int) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:

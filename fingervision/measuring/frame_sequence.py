@@ -2,10 +2,10 @@
 
 A finger is a body: between two frames it moves, rotates and bends a little, at any speed, but it keeps its width and
 its outline. Wrong content in a picture (a page of memory that was not written again, a lost packet that no checksum
-covers, an object that passes) has other outlines. A jump of the measuring points alone proves nothing, because stages
-make steps and springs vibrate; nor does another outline alone, because parts come and go. A measurement is refused if
-its measuring points jump, the fingers there have not the outlines that they have in the last frame, and the next frames
-do not confirm the change.
+covers, an object that passes) has other outlines, or tears the picture between two rows. A jump of the measuring points
+alone proves nothing, because stages make steps and springs vibrate; nor does another outline alone, because parts come
+and go. A measurement is refused if its measuring points jump, the fingers there have not the outlines that they have in
+the last frame, and the next frames do not confirm the change.
 
 Method: the outlines of a finger are followed from the measuring point towards its root, on the inner and on the outer
 side, as the places where the grey level passes through that of the measured edge. Relative to the measuring point, and
@@ -50,6 +50,10 @@ SEARCH_PX = 40
 MOST_DIFFERENT, FEWEST_BANDS = 0.4, 4
 # A finger is torn if this number of bands have its width (within a share), but stand elsewhere.
 FEWEST_TORN, SAME_WIDTH = 2, 0.1
+# A decoder that loses its place in a row shows all that follows elsewhere, and at other levels: a picture is torn if
+# over one row more of its width changes, by this share, than over any row of the other picture. A change of a level
+# counts from this share of the fingers' contrast.
+TORN_SHARE, LEAST_STEP = 0.25, 0.08
 
 WORDS = (
     "The fingers would have jumped in this frame alone, and their outlines are not those of the frames before and "
@@ -72,6 +76,11 @@ class _Look:
     sides_px: Floats
     beyond: Floats
 
+    @property
+    def is_comparable(self) -> bool:
+        """Whether enough bands of the finger are in view for a judgement."""
+        return bool(np.count_nonzero(np.isfinite(self.sides_px).any(axis=0)) >= FEWEST_BANDS)
+
 
 class _Seen:
     """A frame with its gap, and how its two fingers look."""
@@ -84,6 +93,14 @@ class _Seen:
     def looks(self) -> tuple[_Look, _Look]:
         """How the left and the right finger look, computed when first asked for."""
         return _look(self, self.gap.left, is_left=True), _look(self, self.gap.right, is_left=False)
+
+    @cached_property
+    def torn_share(self) -> float:
+        """Largest share of the picture's width over which the grey level changes from a row to the next."""
+        grey = to_grey(self.frame.pixels)
+        least = LEAST_STEP * min(abs(one.contrast) for one in self.fingers)
+        is_step = np.asarray(cv2.absdiff(grey[1:], grey[:-1])) > least
+        return float(np.max(np.mean(is_step, axis=1)))
 
     @cached_property
     def positions(self) -> tuple[tuple[float, float], ...]:
@@ -168,11 +185,13 @@ def _is_alike(first: _Seen, second: _Seen) -> bool:
         tolerance_px = JUMP_U * hypot(one.u_across_px, other.u_across_px) + CODED_PX + bent_px
         if not _agree(first.looks[k], second.looks[k], tolerance_px):
             return False
-    return True
+    return abs(first.torn_share - second.torn_share) <= TORN_SHARE
 
 
 def _agree(one: _Look, other: _Look, tolerance_px: float) -> bool:
     """Whether two outlines of a finger differ by no more than a rotation and a tolerance, beneath the same ground."""
+    if one.is_comparable is not other.is_comparable:
+        return False
     count = min(one.sides_px.shape[1], other.sides_px.shape[1])
     sides_px = np.stack((one.sides_px[:, :count], other.sides_px[:, :count]))
     is_seen = np.isfinite(sides_px).any(axis=0)

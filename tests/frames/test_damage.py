@@ -149,6 +149,18 @@ def test_a_chunk_whose_length_is_damaged_is_no_other_frame_of_the_index(tmp_path
     assert whole >= COUNT - 3
 
 
+def test_an_index_counts_from_where_the_chunks_lead_and_not_from_a_word_that_was_moved(tmp_path: Path) -> None:
+    path = tmp_path / "clip.avi"
+    content = coded(path, "mjpeg")
+    page = (content.index(b"movi") // 2048) * 2048
+
+    def change(changed: bytearray) -> None:  # a page with the head of the list of pictures, and one of pictures
+        one, other = slice(page, page + 2048), slice(page + 8192, page + 10240)
+        changed[one], changed[other] = content[other], content[one]
+
+    nothing_wrong(path, change)
+
+
 def test_a_name_that_is_damaged_in_the_index_moves_no_frame(tmp_path: Path) -> None:
     path = tmp_path / "clip.avi"
     content = coded(path, "mjpeg")

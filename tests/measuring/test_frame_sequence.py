@@ -102,3 +102,23 @@ def test_a_change_that_lasts_is_believed() -> None:
 
 def test_pictures_without_times_are_not_compared() -> None:
     assert refused(MOTIONS["rest"], lambda k, levels: torn(levels) if k == 6 else None, has_times=False) == []
+
+
+@pytest.mark.parametrize("first_row", [0, 20])
+def test_a_motion_in_a_picture_that_is_torn_between_two_rows_is_no_motion(first_row: int) -> None:
+    # A decoder without checksums that loses its place shows all that follows elsewhere, and at other levels. A change
+    # of the light is that of the whole picture.
+    def change(k: int, levels: np.ndarray) -> None:
+        if k == 6:
+            levels[first_row:] -= 24
+
+    assert refused(MOTIONS["shock"], change) == ([6] if first_row else [])
+
+
+def test_fingers_that_the_border_cuts_in_one_frame_are_not_confirmed_by_the_others() -> None:
+    def change(k: int, levels: np.ndarray) -> None:
+        if k == 6:
+            levels[:] = np.roll(levels, 155, axis=0)
+            levels[:, :160] = np.roll(levels[:, :160], -20, axis=1)
+
+    assert refused(MOTIONS["rest"], change) == [6]
