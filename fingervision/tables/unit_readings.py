@@ -18,6 +18,8 @@ UNITS = {
 """Units that are offered, the most usual first."""
 TIME_STEPS_S = (2e-6, 2.0)
 """Time between rows (s) that is plausible: logs of stages have 5 to 1000 rows per second."""
+FEWEST_COUNTS = 100
+"""Range of whole numbers above which they may be an encoder's counts, whose size only the user knows."""
 TIMES_TEN = re.compile(r"[x\u00d7*\u00b7]\s*(.+)")
 """A unit with a multiplication sign before it: `x10 um` may mean tens of micrometres, or numbers times ten."""
 
@@ -30,6 +32,8 @@ def unit_question(words: str, role: str, dimension: str, values: NDArray[np.floa
     >>> unit_question("?", "gap", "length", np.array([0.0, 1.2])).key
     'units.gap=mm'
     >>> [each.key for each in unit_question("?", "gap", "length", np.array([0.0, 1200.0])).readings]
+    ['units.gap=um', 'units.gap=SIZE um']
+    >>> [each.key for each in unit_question("?", "gap", "length", np.array([0.5, 1200.0])).readings]
     ['units.gap=um']
     >>> unit_question("?", "time", "time", 20.0 * np.arange(5.0)).key
     'units.time=ms'
@@ -37,7 +41,10 @@ def unit_question(words: str, role: str, dimension: str, values: NDArray[np.floa
     units = [unit for unit in UNITS[dimension] if _is_plausible(dimension, unit, values)] or [UNITS[dimension][0]]
     if dimension == "time" and counts_days(values):
         units = ["d"]
-    return asked(words, unit_readings(role, dimension, units, values))
+    readings = unit_readings(role, dimension, units, values)
+    if dimension == "length" and values.size and np.ptp(values) >= FEWEST_COUNTS and np.all(values == np.rint(values)):
+        readings.append(Reading(f"units.{role}=SIZE um", "counts, each worth SIZE um"))
+    return asked(words, readings)
 
 
 def unit_readings(role: str, dimension: str, units: list[str], values: NDArray[np.float64]) -> list[Reading]:

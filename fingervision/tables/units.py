@@ -48,6 +48,7 @@ POWER = re.compile(
     r"(?:10\s*(?:\^|\*\*)\s*(?P<power>[+-]?\d{1,2})|[eE](?P<e>[+-]\d{1,2})|1\s*/\s*(?P<part>[1-9]\d*))\s*"
 )
 """A power of ten or a fraction before a unit: `10^-3 mm`, `e-6 m`, `1/100 mm`."""
+SINCE = re.compile(r"\s+since\b.*")
 CASE_TELLS = {"Mm": None, "MN": None, "Nm": None}
 """Spellings whose meaning differs from that of their lower case; the user is asked about their meaning."""
 NO_UNIT = frozenset({"", "-", "1", "[-]", "\u2013", "none", "n/a"})
@@ -62,8 +63,8 @@ def registry() -> "UnitRegistry[Any]":
 
 
 def spelled(text: str) -> str:
-    """Normalise the spelling of a unit: one micro sign, no brackets."""
-    text = text.strip().strip("[](){}<>").strip().rstrip(".")
+    """Normalise the spelling of a unit: one micro sign, no brackets, and no origin of times (`s since 1904`)."""
+    text = SINCE.sub("", text).strip().strip("[](){}<>").strip().rstrip(".")
     text = text.replace("\u03bc", "µ").replace("Âµ", "µ").replace("Î¼", "µ")
     # One character for a unit, as fonts of East Asia have it.
     return text.replace("\u339c", "mm").replace("\u339b", "µm").replace("\u339a", "nm").replace("\u33b3", "ms")

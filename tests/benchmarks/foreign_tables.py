@@ -4,9 +4,9 @@ Run as `python -m tests.benchmarks.foreign_tables [--each 40] [--seed 1] [--show
 decimals and commas, other units, several axes, set-points, layouts of makers, and clocks that leap or lost values are
 drawn with known truth (`foreign/drawn.py`, which shares nothing with the reader). If the reader asks, the user runs the
 command that the message ends with. If a question lists several readings, the user takes the one whose numbers fit the
-measurement, and where none does, the first. Printed for each class: tables read rightly without a question, wrongly
-without a question (must be 0), rightly after obeying, wrongly after obeying (must be 0), and dead ends (at most one in
-ten). Exit code 1 if a bar is not met.
+measurement, and where none does, the one for counts (whose size this user does not know), or else the first. Printed
+for each class: tables read rightly without a question, wrongly without a question (must be 0), rightly after obeying,
+wrongly after obeying (must be 0), and dead ends (at most one in ten). Exit code 1 if a bar is not met.
 """
 
 import argparse
@@ -96,6 +96,7 @@ def _advice(error: OpenQuestionError, table: Drawn) -> list[str]:
     words = shlex.split(command)
     for question in error.questions:
         fitting = [each.key for each in question.readings if _fits(each, table)]
+        fitting += [each.key for each in question.readings if "SIZE" in each.key]
         if fitting:
             words[words.index(question.key)] = fitting[0]
     return words

@@ -48,3 +48,23 @@ def test_metres_or_micrometres_called_millimetres_are_asked_about_even_if_both_c
     table.write_text("\n".join(["Time [s],Position [mm],Gap [mm]", *rows]), encoding="utf-8")
     with pytest.raises(OpenQuestionError, match=r"0 to 1\.95 mm"):
         read_measured_table(table)
+
+
+def test_whole_numbers_without_a_unit_may_be_counts_whose_size_only_the_user_knows(tmp_path: Path) -> None:
+    rows = [f"{0.1 * k:.1f},{13000 + 20 * k},{0.3 + 0.2 * k:.3f}" for k in range(40)]
+    table = tmp_path / "encoder.csv"
+    table.write_text("\n".join(["Time [s],Encoder,Gap [mm]", *rows]), encoding="utf-8")
+    with pytest.raises(OpenQuestionError, match="counts") as caught:
+        read_measured_table(table)
+    keys = [each.key for each in caught.value.questions[0].readings]
+    assert keys[0] == "units.input=um"
+    assert keys[-1] == "units.input=SIZE um"
+
+
+def test_times_since_an_origin_are_times(tmp_path: Path) -> None:
+    rows = [f"{3.8e9 + 0.1 * k:.1f}\t{0.01 * k:.3f}\t{0.3 + 0.2 * k:.3f}" for k in range(40)]
+    table = tmp_path / "labview.txt"
+    table.write_text("\n".join(["Time (s since 1904)\tPosition (mm)\tGap (mm)", *rows]), encoding="utf-8")
+    time_s = read_measured_table(table).time_s
+    assert time_s is not None
+    assert time_s[-1] - time_s[0] == pytest.approx(3.9)
