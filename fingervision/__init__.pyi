@@ -29,6 +29,8 @@ from fingervision.interface.comparison import Comparison as Comparison
 from fingervision.interface.comparison import compare as compare
 from fingervision.interface.diagnosis import Diagnosis as Diagnosis
 from fingervision.interface.diagnosis import diagnose as diagnose
+from fingervision.interface.inspection import Inspection as Inspection
+from fingervision.interface.inspection import inspect as inspect
 from fingervision.interface.measure import measure as measure
 from fingervision.interface.measurement import Measurement as Measurement
 from fingervision.interface.own_effect import effect as effect

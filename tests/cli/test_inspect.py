@@ -55,12 +55,12 @@ def test_no_fingers_is_exit_1_with_the_remedy(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--seconds", "0"), "--seconds"),
-        (("--seconds", "nan"), "--seconds"),
+        (("--seconds", "0"), "seconds"),
+        (("--seconds", "nan"), "seconds"),
         (("--px-per-mm", "-3"), "positive"),
         (("--px-per-mm", "34", "--calibration", "c.json"), "leave out one of them"),
         (("--px-per-mm", "34", "--roi", "0,0,9999,10"), "inside the frame"),
-        (("--px-per-mm", "34", "--below-tip-mm", "0"), "below-tip"),
+        (("--px-per-mm", "34", "--below-tip-mm", "0"), "below"),
         (("--px-per-mm", "34", "--response", "nothing.csv"), "response"),
     ],
 )
