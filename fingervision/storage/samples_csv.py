@@ -2,9 +2,10 @@
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, make_dataclass
+from functools import cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.field import Field, names_of
@@ -52,11 +53,19 @@ class SampleRow:
 COLUMNS = ",".join(names_of(SampleRow))
 
 
-class SamplesCsv(RowFile[SampleRow]):
-    """Writes samples.csv row by row; `go_on` appends to an existing file."""
+@cache
+def row_with(channels: tuple[str, ...]) -> type[SampleRow]:
+    """The record of a row with further columns, one for each channel of the test bed, by their names."""
+    value = Annotated[float | None, Field("value of a channel at the time of the exposure")]
+    more = [(name, value, field(default=None)) for name in channels]
+    return make_dataclass("SampleRow", more, bases=(SampleRow,), frozen=True, slots=True) if channels else SampleRow
 
-    def __init__(self, path: Path, *, go_on: bool = False) -> None:
-        super().__init__(path, SampleRow, go_on=go_on)
+
+class SamplesCsv(RowFile[SampleRow]):
+    """Writes samples.csv row by row, with a column for each channel; `go_on` appends to an existing file."""
+
+    def __init__(self, path: Path, channels: tuple[str, ...] = (), *, go_on: bool = False) -> None:
+        super().__init__(path, row_with(channels), go_on=go_on)
 
 
 def read_samples(path: Path) -> list[SampleRow]:
@@ -72,8 +81,9 @@ def read_samples(path: Path) -> list[SampleRow]:
         whole = text[: text.rfind(b"\n") + 1]
         lines = whole.decode("utf-8").splitlines()
         columns = lines[0] if lines else COLUMNS
-        names = COLUMNS.split(",")
-        rows = [row_of(SampleRow, names, cells) for cells in csv.reader(lines[1:])] if columns == COLUMNS else []
+        ours, names = f"{columns},".startswith(f"{COLUMNS},"), columns.split(",")
+        record = row_with(tuple(names[len(COLUMNS.split(",")) :])) if ours else SampleRow
+        rows = [row_of(record, names, cells) for cells in csv.reader(lines[1:])] if ours else []
         if len(whole) < len(text):
             with path.open("rb+") as file:
                 file.truncate(len(whole))
@@ -84,12 +94,15 @@ def read_samples(path: Path) -> list[SampleRow]:
             f"{path} must be the table of samples of the interrupted run, but cannot be read as one ({error}): name "
             "another folder with --out."
         ) from error
-    if columns != COLUMNS:
+    if not ours:
         raise DataError(f"{path} must be the table of a run on the test bed, but has another header.")
     return rows
 
 
 def write_rows(path: Path, rows: Sequence[SampleRow]) -> None:
     """Replace the table by the given rows; the file on disk is complete at any time."""
+    record: Any = type(rows[-1]) if rows else SampleRow
+    names = names_of(record)
+    alike = (record(**{name: getattr(row, name, None) for name in names}) for row in rows)
     with replaced(path) as part:
-        part.write_text("\n".join((COLUMNS, *map(line_of, rows))) + "\n", encoding="utf-8")
+        part.write_text("\n".join((",".join(names), *map(line_of, alike))) + "\n", encoding="utf-8")

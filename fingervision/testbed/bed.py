@@ -12,6 +12,7 @@ from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import ForceSensor
 from fingervision.testbed.motion.soft_limits import SoftLimits
 from fingervision.testbed.operators.operator import Operator
+from fingervision.testbed.text_protocol.sensor import TextSensor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +43,8 @@ class Bed:
         Whether the same commands give the same results, so that an interrupted run can be brought back to its state.
     about : mapping
         Description for run.json.
+    channels : mapping of str to TextSensor
+        Further quantities that are recorded with each frame, by the names of their columns.
     """
 
     clock: Clock
@@ -55,6 +58,7 @@ class Bed:
     model: Model | None = None
     replays: bool = False
     about: Mapping[str, Any] = field(default_factory=dict)
+    channels: Mapping[str, TextSensor] = field(default_factory=dict)
 
     def close(self) -> None:
         """Stop the motor first, then release all hardware."""
@@ -63,3 +67,5 @@ class Bed:
             self.force_sensor.close()
         if self.camera is not None:
             self.camera.close()
+        for channel in self.channels.values():
+            channel.close()

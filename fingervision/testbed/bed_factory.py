@@ -1,5 +1,7 @@
 """Build a test bed from its configuration."""
 
+import re
+from collections.abc import Collection
 from contextlib import suppress
 from importlib import resources
 from pathlib import Path
@@ -14,6 +16,7 @@ from fingervision.models.kinds import build_model, kinds
 from fingervision.models.physics import Physics
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.gripper_toml import read_gripper
+from fingervision.storage.samples_csv import COLUMNS
 from fingervision.storage.toml_section import Section, read_document
 from fingervision.tables.read import read_simulation_table
 from fingervision.testbed.actuator import Actuator, StageLimits
@@ -29,11 +32,14 @@ from fingervision.testbed.simulation.gripper import SimulatedGripper
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 from fingervision.testbed.simulation.recording_actuator import Followed
 from fingervision.testbed.simulation.sample_gripper import sample_gripper
+from fingervision.testbed.text_protocol import sensor
+from fingervision.testbed.text_protocol.sensor import TextSensor, opened_sensor
 
 SIMULATED = "simulated"
 SCHEMA = 1
+NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 PARTS = ("actuator", "force_sensor", "camera")
-TOP_KEYS = ("schema", "name", "seed", "below_tip_mm", *PARTS, "gripper", "limits", "scale")
+TOP_KEYS = ("schema", "name", "seed", "below_tip_mm", *PARTS, "channel", "gripper", "limits", "scale")
 
 
 def open_bed(
@@ -116,6 +122,11 @@ def _built(
         if "camera" in parts:
             camera = parts["camera"].build(sections["camera"], context)
             opened.append(camera)
+        channels: dict[str, TextSensor] = {}
+        for section in top.tables("channel"):
+            name = channel_name(section, channels)
+            channels[name] = opened_sensor(section, context)
+            opened.append(channels[name])
     except BaseException:
         for part in opened:
             with suppress(FingervisionError):
@@ -139,8 +150,20 @@ def _built(
             "actuator": actuator.name,
             "force_sensor": None if force is None else force.name,
             "camera": None if camera is None else camera.description.name,
+            **({"channels": {name: channel.name for name, channel in channels.items()}} if channels else {}),
         },
+        channels=channels,
     )
+
+
+def channel_name(section: Section, known: Collection[str]) -> str:
+    """Read the name of a channel, which becomes a column of samples.csv."""
+    section.only(("name", "kind", *sensor.KEYS))
+    section.word("kind", "serial_text", of=("serial_text",))
+    name = section.word("name")
+    if not NAME.fullmatch(name) or name in (*COLUMNS.split(","), *known):
+        section.refuse("name", f"must be letters, digits and _, and no other column's name, but is {name!r}.")
+    return name
 
 
 def read_configuration(name: str) -> Section:

@@ -85,12 +85,14 @@ class Runner:
             with watch.controls.listening((lambda: None) if replays else actuator.stop):
                 self._execute()
         except BaseException:
-            actuator.stop()
-            if not replays:
-                # No later readings will improve the last positions: write their rows now. A test bed that replays
-                # records these frames again.
-                with suppress(FingervisionError):
-                    watch.record.write(at_once=True)
+            try:
+                actuator.stop()
+            finally:
+                if not replays:
+                    # No later readings will improve the last positions: write their rows now. A test bed that replays
+                    # records these frames again.
+                    with suppress(FingervisionError):
+                        watch.record.write(at_once=True)
             raise
         return watch.record.counts
 

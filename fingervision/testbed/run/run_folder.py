@@ -80,7 +80,7 @@ class BedRunFolder:
                 write_calibration(bed.scale, path / CALIBRATION)
             if bed.model is not None and SIMULATION not in kept:
                 write_expected(path / SIMULATION, bed.model, bed.limits)
-            self._samples = SamplesCsv(path / SAMPLES, go_on=bool(self.rows))
+            self._samples = SamplesCsv(path / SAMPLES, tuple(bed.channels), go_on=bool(self.rows))
             self._video = RecordedVideo(path / VIDEO, None, keep=len(self.rows))
         except FingervisionError:
             self._lock.release()

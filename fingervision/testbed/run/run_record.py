@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fingervision.domain.effect import REZEROED
 from fingervision.domain.frame import Frame
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.storage.samples_csv import MM_PLACES, SampleRow
+from fingervision.storage.samples_csv import MM_PLACES, SampleRow, row_with
 from fingervision.testbed.run.run_folder import BedRunFolder
 from fingervision.testbed.run.synchronised_acquisition import Look
 
@@ -113,7 +113,7 @@ class RunRecord:
         """Add a frame; its row is written once the stage's position is known."""
         if self._zero_s is None:
             self._zero_s = look.shot.device_s - self._base_s
-        row = SampleRow(
+        row = row_with(tuple(look.channels))(
             run=self.label,
             time_s=round(look.shot.device_s - self._zero_s, 6),
             input_mm=None,
@@ -129,6 +129,7 @@ class RunRecord:
             encoder_mm=_rounded(look.encoder_mm),
             camera_s=round(look.shot.device_s, 6),
             arrived_s=round(look.shot.arrived_s, 6),
+            **look.channels,
         )
         self.folder.add_picture(picture, row.time_s)
         self._waiting.append((row, look.exposed_s, picture))

@@ -1,7 +1,8 @@
 """Stage position and force at the time of each camera frame."""
 
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from fingervision.testbed.clocks.board_clock import ClockJoin
 from fingervision.testbed.clocks.camera_clock import ArrivalClock
 from fingervision.testbed.force_sensor import ForceSensor
 from fingervision.testbed.reading import Reading
+from fingervision.testbed.text_protocol.sensor import TextSensor
 from fingervision.vision.pipeline import Settings, measure_frame
 
 # Number of readings that are kept: at 200 readings per second they cover far more than the latency of a frame.
@@ -93,6 +95,22 @@ class Force(JoinedInstrument):
         return float(np.interp(self.device_at(bed_s), self._device_s, self._force_n))
 
 
+class Channel:
+    """A further quantity over time, whose times are those of the test bed."""
+
+    def __init__(self, source: TextSensor) -> None:
+        self._source = source
+        self._at_s: deque[float] = deque(maxlen=READINGS_KEPT)
+        self._value: deque[float] = deque(maxlen=READINGS_KEPT)
+
+    def at(self, bed_s: float) -> float | None:
+        """Value at a time, linear between readings and held after the newest; None before the first reading."""
+        for reading in self._source.samples():
+            self._at_s.append(reading.device_s)
+            self._value.append(reading.value)
+        return float(np.interp(bed_s, self._at_s, self._value)) if self._at_s else None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
     """One frame, with stage position and force at its exposure.
@@ -109,6 +127,8 @@ class Look:
         Force at the drive at the exposure.
     force_now_n : float or None
         Latest reading of the force.
+    channels : mapping of str to float or None
+        Values of the channels at the exposure.
     """
 
     shot: Shot
@@ -116,6 +136,7 @@ class Look:
     encoder_mm: float
     force_n: float | None
     force_now_n: float | None
+    channels: Mapping[str, float | None] = field(default_factory=dict)
 
 
 class Sight:
@@ -146,6 +167,7 @@ class Sight:
         self.width_mm = description.width_px / bed.scale.px_per_mm
         self.position = Position(bed.actuator)
         self.force = None if bed.force_sensor is None else Force(bed.force_sensor)
+        self.channels = {name: Channel(sensor) for name, sensor in bed.channels.items()}
         self.camera_clock = ArrivalClock(bed.camera.latency)
         self._settings = Settings(bed.below_tip_mm * bed.scale.px_per_mm)
         self._rows = RowMaker(bed.scale, (description.width_px, description.height_px))
@@ -160,7 +182,8 @@ class Sight:
         exposed_s = self.camera_clock.joined().bed_at(shot.device_s)
         force_n = None if self.force is None else self.force.at(exposed_s)
         force_now_n = None if self.force is None else self.force.newest
-        return Look(shot, exposed_s, self.position.newest, force_n, force_now_n)
+        channels = {name: channel.at(exposed_s) for name, channel in self.channels.items()}
+        return Look(shot, exposed_s, self.position.newest, force_n, force_now_n, channels)
 
     def clocks(self) -> dict[str, dict[str, float]]:
         """Relation of each instrument's clock to the test bed's, for run.json."""

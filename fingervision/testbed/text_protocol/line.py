@@ -68,8 +68,9 @@ class VisaPort:
     def __init__(self, name: str, baud: int | None) -> None:
         import pyvisa
 
-        resource, _, backend = name.partition("@")
-        self._manager: Any = pyvisa.ResourceManager(f"@{backend}" if backend else "")
+        # A backend other than the default follows: `...::INSTR@py`, or `...::INSTR@instruments.yaml@sim`.
+        resource, at, backend = name.partition("@")
+        self._manager: Any = pyvisa.ResourceManager(backend if "@" in backend else at + backend)
         speed: dict[str, Any] = {} if baud is None else {"baud_rate": baud}
         self._port: Any = self._manager.open_resource(resource, **speed)
 

@@ -6,7 +6,7 @@ import struct
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from time import monotonic
+from time import monotonic, sleep
 
 # GRBL and Marlin state their position in steps of a motor.
 STEPS_PER_MM = 8000.0
@@ -296,6 +296,31 @@ class NewportEsp(Emulator):
             case _:
                 self.error = "6, 4523, COMMAND DOES NOT EXIST"
         return []
+
+
+class Meter(Emulator):
+    """A multimeter or a balance: it answers SCPI's READ? and MT-SICS' SI, as slowly as it is told."""
+
+    value = 1.25
+    takes_s = 0.0
+
+    def answer(self, line: str) -> list[str]:
+        sleep(self.takes_s)
+        answers = {"*IDN?": "Maker,DMM,1,1.0", "READ?": f"{self.value:+.6E}", "SI\r": f"S S {self.value:9.2f} g"}
+        return [answers[line]] if line in answers else []
+
+
+class PrintedNumbers(Emulator):
+    """A board with a load cell that prints 80 numbers a second without being asked."""
+
+    value = 84_000
+
+    def _talk(self, client: socket.socket) -> None:
+        with suppress(OSError):
+            while True:
+                sleep(1.0 / 80.0)
+                if not self.silent:
+                    client.sendall(b"what\r\n" if self.nonsense else f"{self.value}\r\n".encode())
 
 
 COUNTS_PER_MM = 34304.0

@@ -46,6 +46,8 @@ class MotorRecordServer:
 
     def unplug(self) -> None:
         self._process.kill()
-        self._process.communicate()
+        self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
 
     close = unplug

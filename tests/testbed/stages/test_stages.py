@@ -27,7 +27,8 @@ from tests.testbed.stages.stage_cases import CAMERA, CASES, Case
 
 # pyserial does not close the socket of a `socket://` port whose other end has closed it.
 pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
-PATIENCE_S = 60.0
+# The computer may be loaded by other tests.
+PATIENCE_S = 240.0
 # At least 300 frames, however slow the computer is: a triangle, and ten points with thirty frames each.
 RECIPE = """
 schema = 1
@@ -169,7 +170,7 @@ def test_a_run_that_is_unplugged_loses_nothing_and_goes_on(case: Case, device: A
     path, out = str(case.bed_at(tmp_path, device, CAMERA)), tmp_path / "run"
     recipe = read_recipe(recipe_at(tmp_path))
     bed = open_bed(path)
-    pulled = threading.Thread(target=lambda: _when(lambda: frames_in(out / "video.mp4") > 50, device.unplug))
+    pulled = threading.Thread(target=lambda: _when(lambda: frames_in(out / "video.mp4") > 30, device.unplug))
     pulled.start()
     with pytest.raises(FingervisionError, match=r"cable|emergency stop"):
         run_recipe(recipe, bed, out)
@@ -202,7 +203,7 @@ def test_a_run_that_is_killed_goes_on_after_the_same_bytes(case: Case, device: A
         str(out),
     ]
     process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _when(lambda: frames_in(out / "video.mp4") > 50 or process.poll() is not None, lambda: None)
+    _when(lambda: frames_in(out / "video.mp4") > 30 or process.poll() is not None, lambda: None)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     before, rows = (out / "samples.csv").read_bytes(), read_samples(out / "samples.csv")
