@@ -129,9 +129,8 @@ def _explained(
     data = prepare(table, model, without)
     refitted = _searched(data, rng, forced, without, progress)
     data, found = refitted.data, refitted.found
-    mistake = mistaken_column(data, found.problem, (found.nothing, found.nearest, found.best, *found.singles))
-    if mistake is None and (found.unknown is not None or not found.best.names):
-        mistake = swapped_directions(data, found.problem)
+    rivals = (found.nothing, found.nearest, found.best, *found.singles)
+    mistake = mistaken_column(data, found.problem, rivals) or swapped_directions(data, found.problem, rivals)
     if mistake is None and found.unknown is None:
         mistake = mixed_rows(data, found.best, found.problem)
     if mistake is not None and mistake.blocks:

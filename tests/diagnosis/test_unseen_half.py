@@ -9,6 +9,7 @@ from fingervision.diagnosis.design.next_look import lacking, next_look
 from fingervision.diagnosis.inference.held_out_prediction import fails_on_unseen_half, left_out_rms_mm
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.searched import problem_of
+from fingervision.diagnosis.inference.verdict import resembling
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.measured_table import MeasuredTable
@@ -61,3 +62,13 @@ def test_there_is_always_a_next_step() -> None:
     timeless = replace(data, chain=replace(data.chain, history=replace(data.chain.history, time_s=None)))
     assert "time_s" in next_look(timeless, Verdict.UNKNOWN, None, (), mistaken=False)
     assert "question about the table" in next_look(data, Verdict.UNKNOWN, None, (), mistaken=True)
+
+
+def test_noise_seldom_resembles_itself_and_structure_does() -> None:
+    rng = np.random.default_rng(2)
+    u = np.linspace(0.0, 1.0, 40)
+    # Two orders of the rows are looked at, each at 5 %.
+    assert np.mean([resembling(rng.standard_normal(40), rng.permutation(u)) for _ in range(400)]) < 0.12
+    assert resembling(np.sin(6.0 * u) + 0.3 * rng.standard_normal(40), u)
+    shuffled = rng.permutation(40)
+    assert resembling((np.sin(6.0 * u) + 0.3 * rng.standard_normal(40))[shuffled], u[shuffled])

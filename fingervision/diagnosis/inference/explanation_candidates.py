@@ -1,6 +1,7 @@
 """Candidate explanations of one to three effects: ranked by linear signatures, then refitted jointly."""
 
 from collections.abc import Callable, Mapping
+from itertools import permutations
 
 import numpy as np
 
@@ -137,6 +138,23 @@ def extended(
         [fit(problem, e.names, e.values, iterations=20) for e in ranked[:refined]] + ranked[refined:],
         key=lambda e: e.score,
     )
+
+
+def pairs_in_time(problem: Problem, atoms: Signatures, singles: list[Explanation]) -> list[Explanation]:
+    """Fit every pair of effects with memory, each from the best of one's starting values beside the fit of the other.
+
+    The signature of an effect with memory beside another one is hardly linear: a search from signatures missed a speed
+    limit with a resonance, and stopped at four times their residual.
+    """
+    owner, found = np.array(atoms.names), dict[tuple[str, ...], Explanation]()
+    acting = [e for e in singles if problem.effects[e.names[0]].memory]
+    for base, other in permutations(acting, 2):
+        name = other.names[0]
+        start, _ = scan(problem, base, name, [atoms.starts[k] for k in np.flatnonzero(owner == name)])
+        pair = fit(problem, (*base.names, name), {**base.values, name: start}, iterations=7)
+        if pair.names not in found or pair.score < found[pair.names].score:
+            found[pair.names] = pair
+    return list(found.values())
 
 
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:

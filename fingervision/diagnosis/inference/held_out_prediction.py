@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
@@ -67,22 +67,18 @@ def fails_on_unseen_half(data: Observations, problem: Problem, explanation: Expl
     The halves are every other run or, of a single run, its first and second half. A name that does not predict what it
     did not see describes this table and no property of the set-up.
     """
-    history = data.chain.history
-    n = history.input_mm.size
+    n = data.chain.history.input_mm.size
     bare, whole = data.chain.stacked({}), explanation.values
     alone = [bare - data.chain.stacked({name: whole[name]}) for name in explanation.names]
-    measured = ~problem.whitener.aside[:n] & ~data.distrusted
-    for hidden, words in _halves(n, history.runs):
-        seen, unseen = np.tile(~hidden & measured, bare.size // n), (hidden & measured)
+    for hidden, words in _halves(data):
+        seen = np.tile(~hidden & ~problem.whitener.aside[:n], bare.size // n)
         if any(float(np.sum(one[seen] ** 2)) < LEVERAGE * float(np.sum(one**2)) for one in alone):
             continue
-        change = (_predicted(data, problem, explanation, hidden) - bare)[:n]
-        before = _without_run_means((data.stacked_mm - bare)[:n], unseen, history.runs)
-        moved = _without_run_means(change, unseen, history.runs)
+        before, moved = _on_unseen(data, problem, explanation, hidden)
         old, new = float(np.sum(before**2)), float(np.sum((before - moved) ** 2))
         chance = BY_CHANCE * 2.0 * problem.whitener.noises[0].total_mm * float(np.linalg.norm(moved))
         if new > WORSE**2 * old and new - old > chance:
-            rows = max(1, int(unseen.sum()))
+            rows = max(1, before.size)
             named = " and ".join(explanation.names)
             return (
                 f"{named}, fitted to {words[0]}, predicts {words[1]} worse than no effect does "
@@ -103,6 +99,43 @@ def foretold(data: Observations, found: Findings) -> Findings:
     return replace(found, alternatives=(found.best, *kept)) if len(kept) < len(others) else found
 
 
+def needed(data: Observations, found: Findings) -> Findings:
+    """Drop effects without which the unseen halves are foretold as well, if structure remains beside several effects.
+
+    Beside structure that no effect explains, each further effect also fits a part of that structure, whatever it gains;
+    but the structure of one half does not return in the other.
+    """
+    while len(found.best.names) > 1 and (found.unknown is not None or found.left_over is not None):
+        whole_mm = _unseen_rms_mm(data, found.problem, found.best)
+        fewer = [_without(found, name) for name in found.best.names]
+        least_mm, less = min(((_unseen_rms_mm(data, found.problem, e), e) for e in fewer), key=lambda one: one[0])
+        if least_mm > WORSE * whole_mm:
+            break
+        found = replace(found, best=less, alternatives=(less,))
+    return found
+
+
+def _without(found: Findings, name: str) -> Explanation:
+    kept = {other: found.best.values[other] for other in found.best.names if other != name}
+    refit = fit(found.problem, tuple(kept), kept, iterations=MANY_STEPS)
+    return min([refit, *(e for e in found.singles if e.names == refit.names)], key=lambda e: e.score)
+
+
+def _unseen_rms_mm(data: Observations, problem: Problem, explanation: Explanation) -> float:
+    """RMS error (mm) of both halves of the gap, each predicted from a fit to the other."""
+    errors = [np.subtract(*_on_unseen(data, problem, explanation, hidden)) for hidden, _ in _halves(data)]
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+
+
+def _on_unseen(data: Observations, problem: Problem, explanation: Explanation, hidden: Flags) -> tuple[Array, Array]:
+    """Disagreement of the gap in hidden rows without effects, and its change by effects fitted to the other rows."""
+    bare, runs = data.chain.stacked({}), data.chain.history.runs
+    counted = hidden & ~problem.whitener.aside[: hidden.size]
+    moved = (_predicted(data, problem, explanation, hidden) - bare)[: hidden.size]
+    before = (data.stacked_mm - bare)[: hidden.size]
+    return _without_run_means(before, counted, runs), _without_run_means(moved, counted, runs)
+
+
 def _predicted(data: Observations, problem: Problem, explanation: Explanation, hidden: Flags) -> Array:
     """Prediction of all rows by effects, and by a map, that are fitted without some hidden rows; shape (m,)."""
     aside = problem.whitener.aside | np.tile(hidden, problem.whitener.aside.size // hidden.size)
@@ -119,8 +152,9 @@ def _predicted(data: Observations, problem: Problem, explanation: Explanation, h
     return np.asarray(predicted + curve.columns_mm @ numbers)
 
 
-def _halves(n: int, runs: Sequence[slice]) -> list[tuple[Flags, tuple[str, str]]]:
+def _halves(data: Observations) -> list[tuple[Flags, tuple[str, str]]]:
     """Rows hidden in turn, and words for the rows that are fitted and for those that are predicted."""
+    runs, n = data.chain.history.runs, data.chain.history.input_mm.size
     first = np.zeros(n, dtype=bool)
     names = ("the first half", "the second half")
     if len(runs) > 1:

@@ -22,11 +22,6 @@ and input errors together reach 1.3 * 1.3 * 1.2 = 2.03."""
 HALF = 0.5
 """Largest share of the variance of the disagreement and (unless the gap does not follow the input at all) of the gap
 itself that a mistake in the table may leave, if it is the mistake and not an effect that explains the table."""
-SWAPPED_SIGMAS = 6.0
-"""Standard errors by which the gap must lead at reversals before exchanged directions are suspected: the residual of
-any other effect leads by far less."""
-SWAPPED_SHARE = 0.5
-"""Least share of the squared disagreement that a leading play must explain: the rest may be due to other effects."""
 LEAST_NORM = 1e-6
 """Least share of a play's shape that remains after fitting an offset and a ratio, so that the play is distinguishable
 from these."""
@@ -93,10 +88,8 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
     tried = [(_cost(data, problem, *each) + price[each[0]], each[0]) for each in able]
     if not tried:
         return None
-    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
-    physical = min(rival.bic(rows) + choices(problem, rival) for rival in rivals)
     cost, gain = min(tried)
-    if cost > physical - STRONG:
+    if cost > _physical(problem, rivals) - STRONG:
         return None
     if gain == 0.0:
         words = (
@@ -116,6 +109,12 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
             "because no effect of the catalogue is so large."
         )
     return Finding(words, blocks=True)
+
+
+def _physical(problem: Problem, rivals: Sequence[Explanation]) -> float:
+    """-2 log odds of the most probable explanation by effects."""
+    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
+    return min(rival.bic(rows) + choices(problem, rival) for rival in rivals)
 
 
 def _moved(data: Observations) -> Array:
@@ -243,8 +242,12 @@ def _share_near(values: Array, middle: float) -> float:
     return float(np.mean(np.abs(values - middle) < NARROW * float(np.std(values))))
 
 
-def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
-    """Check for play of the wrong sign: the gap leads the input at reversals instead of lagging behind."""
+def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Explanation]) -> Finding | None:
+    """Ask about play of the wrong sign, by which the gap leads the input at reversals, if no effect explains as much.
+
+    Exchanged directions are a hypothesis beside the effects: a leading play, with an offset and a ratio, must explain
+    half of the disagreement, and its odds against the most probable explanation by effects must be 20 to 1 or more.
+    """
     history = data.chain.history if data.chain.path is None else data.chain.path.history
     rows = np.arange(history.input_mm.size) if data.chain.path is None else data.chain.path.rows
     if history.time_s is None:
@@ -260,7 +263,7 @@ def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
     beside = np.stack([slope * np.tile(shape, slope.size // n) for shape in (constant, line)], axis=1)
     whitened = problem.whitener.columns(beside)[0]
     alone = _without(residual, whitened, offsets, metric)
-    best: tuple[float, float, float] | None = None
+    best: tuple[float, float] | None = None
     for width in history.input_span_mm * np.geomspace(1e-5, 0.3, WIDTHS):
         lag = np.empty_like(history.input_mm)
         for run in history.runs:
@@ -273,13 +276,14 @@ def swapped_directions(data: Observations, problem: Problem) -> Finding | None:
             moved = own - offsets.design @ (metric @ (offsets.design.T @ own))
             coefficient = float(moved @ residual) / norm
             if best is None or coefficient**2 * norm > best[0]:
-                best = coefficient**2 * norm, coefficient * width, coefficient * float(np.sqrt(norm))
+                best = coefficient**2 * norm, coefficient * width
     if best is None:
         return None
-    gain, size_mm, sigmas = best
+    gain, size_mm = best
     stands = offsets.squared(alone, metric)
-    scatter = float(np.sqrt(max((stands - gain) / max(1, residual.size), 1.0)))
-    if sigmas > -SWAPPED_SIGMAS * scatter or gain < SWAPPED_SHARE * stands:
+    # Four numbers are fitted: offset and ratio, size and width of the play.
+    cost = stands - gain + 4.0 * float(np.log(residual.size)) + 2.0 * float(np.log(len(problem.effects)))
+    if size_mm > 0.0 or gain < HALF * stands or cost > _physical(problem, rivals) - STRONG:
         return None
     return Finding(
         f"at reversals the gap leads the input by {1e3 * abs(size_mm):.3g} um instead of lagging behind it, which no "

@@ -6,13 +6,9 @@ import numpy as np
 from scipy.stats import t as student
 
 from fingervision.diagnosis.inference.explanation_candidates import Progress
+from fingervision.diagnosis.inference.held_out_prediction import needed
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.needed_effects import (
-    with_simpler_parts,
-    without_fits_to_structure,
-    without_unneeded_effects,
-)
 from fingervision.diagnosis.inference.position_map import (
     NAME,
 )
@@ -172,7 +168,7 @@ def _settled(state: Searched, look: Look) -> Refitted:
     """Drop unneeded effects, estimate the map and the gains, and compute every parameter's posterior."""
     data, found = state.data, state.found
     if not look.forced & set(found.best.names):
-        found = with_simpler_parts(data, without_fits_to_structure(data, without_unneeded_effects(data, found)))
+        found = needed(data, found)
     best, posterior = settled_with_records(data, found.problem, found.best, look.rng)
     found = found.with_best(best)
     if data.position_map is not None:

@@ -15,6 +15,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     different,
     extended,
     likeliest,
+    pairs_in_time,
     simplest,
     single_effects,
     swapped,
@@ -26,6 +27,7 @@ from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure
 from fingervision.diagnosis.inference.search_state import ROUGH, Findings, SearchState, completes, noise_known
 from fingervision.diagnosis.inference.significance import Evidence
+from fingervision.diagnosis.inference.verdict import STANDING_SHARE
 
 TRIPLE_SHARE = 0.15
 """Least share of the whole change of the prediction that a third effect must contribute (`added_share`): three effects
@@ -106,6 +108,10 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
         return state
     problem, singles = state.problem, state.singles
     pairs = state.with_known(extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress), 2)
+    if pairs and _leaves_structure(state, pairs[0]):
+        in_time = {e.names: e for e in pairs_in_time(problem, state.atoms, singles)}
+        pairs = [min(e, in_time.pop(e.names, e), key=lambda one: one.score) for e in pairs]
+        pairs = sorted([*pairs, *in_time.values()], key=lambda one: one.score)
     pairs = [e for e in swapped(problem, state.atoms, pairs) if not within_a_step(problem, e)]
     state = replace(state, pairs=pairs)
     # Pairs are compared with the best single effect: compared with a simpler formula, a second effect would gain what a
@@ -119,6 +125,12 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
     ):
         return replace(state, best=likeliest(shown[:LIKELIEST], state.values), peers=shown)
     return state
+
+
+def _leaves_structure(state: SearchState, explanation: Explanation) -> bool:
+    """Whether an explanation leaves more than a share of the disagreement that would be named, in chi-square."""
+    rows = state.values - int(state.problem.whitener.aside.sum())
+    return explanation.score - rows > STANDING_SHARE**2 * max(0.0, state.nothing.score - rows)
 
 
 def _beside_roundings(state: SearchState, pairs: list[Explanation]) -> list[Explanation]:

@@ -1,6 +1,6 @@
 """Signatures: change of the prediction by each effect at each of its starting values."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
@@ -41,6 +41,11 @@ class Signatures:
     starts: tuple[dict[str, float], ...]
     grows: tuple[tuple[str, float, float, float, float] | None, ...]
     columns: Array
+    _squares: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Compute the squared lengths of the columns once, because every step of a search needs them."""
+        object.__setattr__(self, "_squares", np.einsum("ij,ij->j", self.columns, self.columns))
 
     def gains(
         self, residual: Array, offsets: RunOffsets, metric: Array, along: Array | None = None
@@ -55,7 +60,7 @@ class Signatures:
         shared = offsets.design.T @ self.columns
         weighted = residual - offsets.design @ (metric @ (offsets.design.T @ residual))
         dot = self.columns.T @ weighted
-        norm = np.einsum("ij,ij->j", self.columns, self.columns) - np.einsum("ij,ij->j", shared, metric @ shared)
+        norm = self._squares - np.einsum("ij,ij->j", shared, metric @ shared)
         full = norm.copy()
         if along is not None and along.shape[1]:
             moved = along - offsets.design @ (metric @ (offsets.design.T @ along))

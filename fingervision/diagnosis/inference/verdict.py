@@ -26,9 +26,12 @@ MANY_ASIDE = 0.1
 """Largest share of rows that may be gross errors if the model agrees; a larger share must have a cause."""
 COMMON = 2.0
 """Mean of the runs' offsets, in standard errors from zero, above which it counts as a common constant."""
-FEWEST_ROWS = 20
-"""Least number of rows whose own scatter may count as noise without repeats: its relative uncertainty is then a sixth.
-Fewer rows cannot distinguish noise from an error of the model."""
+FEWEST_ROWS, ENOUGH_ROWS = 20, 100
+"""Number of rows below which their own scatter is no noise without repeats, because its relative uncertainty exceeds a
+sixth, and number of rows from which its spectrum tells noise from an error of the model. Between them, neighbouring
+rows must not resemble each other (`resembling`)."""
+BY_LUCK = 1.645
+"""Standard deviations below its expectation at which von Neumann's ratio is significant at 5 %, one-sided."""
 UNDECIDED = "The table cannot show whether simulation and measurement agree"
 """Beginning of an *unknown* result that found no structure, but no noise either."""
 LACK_OF_FIT = 1e-3
@@ -150,8 +153,23 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     kept, gross = int(np.sum(~aside)), float(np.mean(aside & ~data.distrusted))
     left_out = tuple(np.flatnonzero(aside).tolist())
     left_mm = rms(after_mm)
-    known = degrees is not None or data.table.u_random_mm is not None or kept >= FEWEST_ROWS or left_mm <= half_digit_mm
+    stated = degrees is not None or data.table.u_random_mm is not None or left_mm <= half_digit_mm
+    gap_mm = _without_scatter(after_mm[:n], runs)[~aside]
+    told = kept >= ENOUGH_ROWS or (kept >= FEWEST_ROWS and not resembling(gap_mm, history.input_mm[~aside]))
+    known = stated or told
     return Standing(rms(before_mm), left_mm, noise, kept, degrees, rounding_mm, gross, left_out, known)
+
+
+def resembling(residual_mm: Array, input_mm: Array) -> bool:
+    """Whether neighbouring rows resemble each other, by order or by input, so that the residual may be structure.
+
+    Von Neumann's ratio of the mean squared successive difference to twice the variance is 1 for independent values,
+    with a standard deviation of 1 / sqrt(n) (von Neumann 1941, doi:10.1214/aoms/1177731677).
+    """
+    variance = float(np.var(residual_mm))
+    ordered = (residual_mm, residual_mm[np.argsort(input_mm, kind="stable")])
+    least = min(float(np.mean(np.diff(values) ** 2)) for values in ordered)
+    return least < 2.0 * variance * (1.0 - BY_LUCK / float(np.sqrt(residual_mm.size)))
 
 
 def isolated(residual_mm: Array, aside: Flags, runs: tuple[slice, ...]) -> Flags:

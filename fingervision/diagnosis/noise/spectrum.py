@@ -112,39 +112,34 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
     slow_doubt : float
         Standard uncertainty of the logarithm of the power at `SLOWEST`, over all kinds of noise.
     """
-
-    def variance(power: Array, kept: Flags, form: Array) -> float:
-        return max(float(np.mean(power[kept] / form[kept])), 1e-24)
-
-    def slowest(share: float, phi: float, form: Array) -> float:
-        levels = [np.log(variance(power, kept, form)) for power, kept in zip(powers, use, strict=True)]
-        return float(np.mean(levels)) + float(np.log(shape(SLOWEST, share, phi)[0]))
-
     mixed = [(share, phi) for share in np.linspace(0.1, 0.9, 9) for phi in CORRELATIONS]
+    kinds = ([(0.0, 0.0)], [(1.0, phi) for phi in CORRELATIONS], mixed)
+    tried = np.array([each for kind in kinds for each in kind])
+    forms = np.array([shape(angle, share, phi) for share, phi in tried])
+    levels = [np.log(_variances(power, kept, forms)) for power, kept in zip(powers, use, strict=True)]
+    costs = sum(
+        kept.sum() * level + np.log(forms[:, kept]).sum(axis=1) for kept, level in zip(use, levels, strict=True)
+    )
+    slow = np.mean(levels, axis=0) + np.log([shape(SLOWEST, share, phi)[0] for share, phi in tried])
     found: list[tuple[float, float, float]] = []
-    costs: list[float] = []
-    prior: list[float] = []
-    slow: list[float] = []
-    for kind in ([(0.0, 0.0)], [(1.0, phi) for phi in CORRELATIONS], mixed):
-        begin = len(costs)
-        for share, phi in kind:
-            form = shape(angle, share, phi)
-            parts = [
-                kept.sum() * np.log(variance(power, kept, form)) + np.sum(np.log(form[kept]))
-                for power, kept in zip(powers, use, strict=True)
-            ]
-            costs.append(float(sum(parts)))
-            slow.append(slowest(share, phi, form))
-            prior.append(1.0 / len(kind))
-        own = np.array(costs[begin:])
+    begin = 0
+    for kind in kinds:
+        own = costs[begin : begin + len(kind)]
+        begin += len(kind)
         weight = np.exp(-(own - own.min()) / TAPERED)
         share, phi = np.average(np.array(kind), axis=0, weights=weight)
         found.append((-own.min() / TAPERED + float(np.log(np.mean(weight))), min(float(share), 1.0), float(phi)))
     _, share, phi = max(found)
-    form = shape(angle, share, phi)
-    likely = np.array(prior) * np.exp(-(np.array(costs) - min(costs)) / TAPERED)
+    prior = np.concatenate([np.full(len(kind), 1.0 / len(kind)) for kind in kinds])
+    likely = prior * np.exp(-(costs - costs.min()) / TAPERED)
     order = np.argsort(slow)
     reached = np.cumsum(likely[order]) / likely.sum()
-    low, high = np.interp((0.159, 0.841), reached, np.array(slow)[order])
-    doubt = 0.5 * float(high - low)
-    return [variance(power, kept, form) for power, kept in zip(powers, use, strict=True)], share, max(phi, 1e-3), doubt
+    low, high = np.interp((0.159, 0.841), reached, slow[order])
+    form = shape(angle, share, phi)[None]
+    best = [float(_variances(power, kept, form)[0]) for power, kept in zip(powers, use, strict=True)]
+    return best, share, max(phi, 1e-3), 0.5 * float(high - low)
+
+
+def _variances(power: Array, kept: Flags, forms: Array) -> Array:
+    """Variance of one sample, for each form of the spectrum; shape (k,)."""
+    return np.asarray(np.maximum((power[kept] / forms[:, kept]).mean(axis=1), 1e-24), dtype=np.float64)
