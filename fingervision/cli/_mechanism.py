@@ -15,16 +15,16 @@ from scipy.interpolate import PchipInterpolator
 from fingervision.cli._body_picture import draw_body, extent_mm, framed
 from fingervision.cli._mechanism_report import add_endurance, print_figures, say_endurance, warn
 from fingervision.cli._model_grip import part_of_pair, write_pair_grip
-from fingervision.cli._model_motion import MotionAsked, move_mechanism
+from fingervision.cli._model_motion import MotionAsked, move
 from fingervision.cli._model_sweep import sweep_mechanism
 from fingervision.cli._model_uncertainty import write_uncertainty
 from fingervision.domain.errors import ArgumentError, FingervisionError, InstallationError, OutputError, UsageError
+from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
 from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.models.mechanism_state import MechanismState
 from fingervision.models.mechanism_uncertainty import mechanism_uncertainty
 from fingervision.storage.mechanism_toml import read_drawing
 from fingervision.storage.simulation_table import POSE
@@ -210,12 +210,11 @@ def predict(
     if drawing.estimates:
         spread = mechanism_uncertainty(drawing.mechanism, drawing.estimates)
         write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)
-    moving = {name: model for name, model in models.items() if isinstance(model, MechanismPlate | MechanismFrame)}
-    if moving:
-        bent = (large_rotation or contact) and asked.drive is not None
-        curves = {name: _curve(states[name]) for name in moving if bent}
-        folders = {name: out if name == chief else out / name for name in moving}
-        move_mechanism(moving, asked, curves, folders, out, as_json=as_json)
+    bent = (large_rotation or contact) and asked.drive is not None
+    curves = {name: _curve(states[name]) for name in models if bent}
+    folders = {name: out if name == chief else out / name for name in models}
+    if chief != "stiffness_matrix":
+        move(models, asked, mechanism.name, folders, out, static=curves, as_json=as_json)
     elif asked.moves:
         click.echo(
             "The model kind stiffness_matrix has no masses and cannot compute motion: choose --kind lumped or "

@@ -6,11 +6,11 @@ from math import copysign
 
 import click
 
+from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.endurance import Endurance, endurance
 from fingervision.models.gripper_figures import unit_of
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import MechanismModel
-from fingervision.models.mechanism_state import MechanismState
 
 _APART = 0.1
 """Relative difference of two kinds of model, beyond their stated errors, from which a message is printed (a

@@ -13,7 +13,6 @@ from fingervision.cli._body_picture import draw_body, extent_mm, framed
 from fingervision.domain.response import Response
 from fingervision.models import published_table
 from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.static_answer import contact_onset_mm
 from fingervision.models.triangulate import PlaneMesh
 
 Array = NDArray[np.float64]
@@ -31,11 +30,11 @@ def draw_deformed(model: FiniteElementGripper, input_mm: float, name: str, path:
     Without contact in the model, an input beyond the first touch would show the fingers penetrating each other; the
     state at the first touch is then plotted instead.
     """
-    onset_mm = contact_onset_mm(model.half, model.physics)
+    onset_mm = model.contact_onset_mm
     beyond = onset_mm is not None and not model.physics.contact and input_mm < onset_mm
     if beyond and onset_mm is not None:
         input_mm = onset_mm
-    moved = model.equilibria([input_mm])[0].displacement_mm
+    moved = model.equilibria([input_mm])[0].displacement
     state = model.loaded([input_mm])[0]
     plate = model.plate
     stress = plate.at_corners(plate.von_mises_mpa(moved, large=model.physics.large_rotation))

@@ -3,7 +3,6 @@
 import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from math import isfinite, pi
 from pathlib import Path
 from typing import Any
@@ -14,11 +13,8 @@ from matplotlib.figure import Figure
 
 from fingervision.domain.errors import UsageError
 from fingervision.models.damping_text import parse_damping
-from fingervision.models.driven_body import DrivenBody
 from fingervision.models.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies_hz
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.models.modal_model import GAP, FreeModes, ModalModel, described, gripper_free_modes, gripper_modes
+from fingervision.models.modal_model import GAP, FreeModes, ModalModel, described
 from fingervision.models.motion_in_time import MODES
 
 _MOST_MODES = 60
@@ -59,34 +55,41 @@ def answer_frequencies(
 ) -> None:
     """Write the frequency response of every kind of model with masses to frequency.csv and frequency.png."""
     found: dict[str, FrequencyResponse] = {}
-    for kind, model in models.items():
-        if isinstance(getattr(model, "half", None), DrivenBody):
-            half = model.half
-            reduced = modes_to(partial(gripper_modes, half), 2.0 * band.last_hz, half.free.size)
-            free = gripper_free_modes(half, reduced.rad_s.size)
-            found[kind] = respond_to(reduced, free, band, damping)
-        elif not as_json:
-            click.echo(f"{kind} has no masses in the plane, and therefore no frequency response.")
+    main = ""
+    for kind, model in moving(models, "frequency response", as_json=as_json).items():
+        reduced = _modes_to(model.modal_model, 2.0 * band.last_hz)
+        main = main or main_column(reduced, name)
+        found[kind] = _respond_to(reduced, model.free_modes(reduced.rad_s.size), band, damping)
     if not found:
         raise UsageError(
             "--frequency needs a kind of model that has masses, lumped or finite_element, but none is chosen "
             "with --kind."
         )
-    write_frequencies(found, ("gap_mm",), out / "frequency.csv")
-    draw_frequencies(found, "gap_mm", f"{name}, damping {damping}", out / "frequency.png")
+    _write_frequencies(found, out / "frequency.csv")
+    _draw_frequencies(found, main, f"{name}, damping {damping}", out / "frequency.png")
     if not as_json:
         for kind, answer in found.items():
-            click.echo(f"{kind}: {peaks_of(answer, 'gap_mm')}")
+            click.echo(f"{kind}: {_peaks_of(answer, main)}")
 
 
-def modes_to(reduce: Callable[[int], ModalModel], highest_hz: float, unknowns: int) -> ModalModel:
+def moving(models: Mapping[str, Any], what: str, *, as_json: bool) -> dict[str, Any]:
+    """Models that have masses in the plane; the others are named."""
+    found = {kind: model for kind, model in models.items() if hasattr(model, "modal_model")}
+    if not as_json:
+        for kind in models:
+            if kind not in found:
+                click.echo(f"{kind} has no masses in the plane, and therefore no {what}.")
+    return found
+
+
+def _modes_to(reduce: Callable[[int], ModalModel], highest_hz: float) -> ModalModel:
     """Compute the modes below a frequency, and the next mode above it."""
-    count = min(MODES, unknowns - 2)
+    count = MODES
     while True:
         reduced = reduce(count)
-        if reduced.modes_hz[-1] > highest_hz or count >= min(_MOST_MODES, unknowns - 2):
+        if reduced.modes_hz[-1] > highest_hz or count >= _MOST_MODES:
             break
-        count = min(2 * count, _MOST_MODES, unknowns - 2)
+        count = min(2 * count, _MOST_MODES)
     if reduced.modes_hz[-1] < 0.5 * highest_hz:
         raise UsageError(
             f"--frequency must end within the first {count} modes, below {reduced.modes_hz[-1]:.4g} Hz, but ends at "
@@ -95,7 +98,7 @@ def modes_to(reduce: Callable[[int], ModalModel], highest_hz: float, unknowns: i
     return reduced
 
 
-def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -> FrequencyResponse:
+def _respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -> FrequencyResponse:
     """Compute the response over a frequency band, with closely spaced frequencies around every resonance."""
     law = parse_damping(damping)
     for rad_s in (reduced.rad_s, free.rad_s):
@@ -111,7 +114,7 @@ def respond_to(reduced: ModalModel, free: FreeModes, band: Band, damping: str) -
     return frequency_response(reduced, free, frequencies, law)
 
 
-def peaks_of(answer: FrequencyResponse, column: str) -> str:
+def _peaks_of(answer: FrequencyResponse, column: str) -> str:
     """Sentence on the frequencies of resonance, with the drive's motion prescribed and with the drive free."""
     words = []
     for what, curve in (
@@ -125,9 +128,9 @@ def peaks_of(answer: FrequencyResponse, column: str) -> str:
     return "; ".join(words)
 
 
-def write_frequencies(found: Mapping[str, FrequencyResponse], columns: tuple[str, ...], path: Path) -> None:
+def _write_frequencies(found: Mapping[str, FrequencyResponse], path: Path) -> None:
     """Write amplitude and phase of every length per unit input and per unit force, and of the drive per unit force."""
-    header = ["kind", "frequency_hz"]
+    columns, header = tuple(next(iter(found.values())).per_input), ["kind", "frequency_hz"]
     for column in columns:
         stem = column.removesuffix("_mm")
         header += [f"{stem}_per_input_mm_mm", f"{stem}_phase_deg", f"{stem}_per_force_mm_n", f"{stem}_force_phase_deg"]
@@ -143,7 +146,7 @@ def write_frequencies(found: Mapping[str, FrequencyResponse], columns: tuple[str
                 writer.writerow([kind, *(f"{value:.7g}" for value in row)])
 
 
-def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title: str, path: Path) -> None:
+def _draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title: str, path: Path) -> None:
     """Plot amplitude and phase per unit input (motion prescribed) and per unit force (drive free)."""
     figure = Figure(figsize=(10.0, 7.0), layout="constrained")
     (upper, upper_force), (lower, lower_force) = figure.subplots(2, 2, sharex=True, height_ratios=(3, 2))
@@ -178,32 +181,19 @@ def draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title:
     figure.savefig(path, dpi=130)
 
 
-def mechanism_frequencies(
-    models: Mapping[str, MechanismPlate | MechanismFrame], band: Band, damping: str, out: Path, *, as_json: bool
-) -> None:
-    """Write frequency.csv and frequency.png of the models of a mechanism whose drawing lists its bodies."""
-    found: dict[str, FrequencyResponse] = {}
-    main, name = "", ""
-    columns: tuple[str, ...] = ()
-    for kind, model in models.items():
-        name = model.mechanism.name
-        reduced = modes_to(model.modal_model, 2.0 * band.last_hz, model.plate.unknowns)
-        if not reduced.observed:
-            raise UsageError(
-                f"{name} must have a [[probe]] or a [[pair]] as the output of the frequency response, but has "
-                "none: add one point ([[probe]]) or the distance of two ([[pair]])."
-            )
-        found[kind] = respond_to(reduced, model.free_modes(reduced.rad_s.size), band, damping)
-        main, columns = main or main_column(reduced), columns or tuple(found[kind].per_input)
-    write_frequencies(found, columns, out / "frequency.csv")
-    draw_frequencies(found, main, f"{name}, damping {damping}", out / "frequency.png")
-    if not as_json:
-        for kind, answer in found.items():
-            click.echo(f"{kind}: {peaks_of(answer, main)}")
+def main_column(reduced: ModalModel, name: str) -> str:
+    """Return the name of the length to plot: the gap if there is one, otherwise the length that changes most.
 
-
-def main_column(reduced: ModalModel) -> str:
-    """Return the name of the length to plot: the gap if there is one, otherwise the length that changes most."""
+    Raises
+    ------
+    UsageError
+        The drawing has neither a probe nor a pair of probes.
+    """
+    if not reduced.observed:
+        raise UsageError(
+            f"{name} must have a [[probe]] or a [[pair]] as the output of a response, but has none: add one point "
+            "([[probe]]) or the distance of two ([[pair]])."
+        )
     if GAP in reduced.observed:
         return GAP
     return max(reduced.observed, key=lambda column: abs(reduced.observed[column].per_input))

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper
-from fingervision.models.driven_body import DrivenBody
-from fingervision.models.grip import Part, first_grip_mm, grip_equilibrium
+from fingervision.models.grip import Part, first_grip_mm, gripped
+from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_loads import GrippedPair, PairGrip
 from fingervision.models.mechanism_plate import MechanismPlate
@@ -60,13 +60,13 @@ def write_grip(
     rows: dict[str, NDArray[np.float64]] = {}
     said = []
     for kind, model in models.items():
-        if not (hasattr(model, "half") or hasattr(model, "grip_force_n")):
+        if not (isinstance(model, DrawnGripper) or hasattr(model, "grip_force_n")):
             click.echo(
                 f"{kind} cannot compute a part between the fingers: grip.csv has no rows of this kind of model.",
                 err=True,
             )
             continue
-        touch = first_grip_mm(model.half, part) if isinstance(getattr(model, "half", None), DrivenBody) else None
+        touch = first_grip_mm(model, part) if isinstance(model, DrawnGripper) else None
         limit = _closing_limit_mm(gripper, model, touch)
         at = np.linspace(limit, 0.3 * abs(limit) + (touch or 0.0), _ROWS) if inputs is None else np.sort(inputs)
         if touch is not None and at.min() < touch < at.max():
@@ -123,18 +123,18 @@ def write_pair_grip(
             "A part between probes can be computed by finite elements only: add --kind finite_element.", err=True
         )
         return
-    gripped, part = GrippedPair(plate, asked.pair), asked.part
-    touch = gripped.touch_input_mm(part)
-    reach = max(abs(touch), 0.1 * gripped.rest_mm / abs(gripped.per_input))
-    closing = -1.0 if gripped.per_input > 0.0 else 1.0
+    held, part = GrippedPair(plate, asked.pair), asked.part
+    touch = held.touch_input_mm(part)
+    reach = max(abs(touch), 0.1 * held.rest_mm / abs(held.per_input))
+    closing = -1.0 if held.per_input > 0.0 else 1.0
     at = np.linspace(touch - 0.3 * closing * reach, touch + 0.5 * closing * reach, _ROWS) if inputs is None else inputs
     if at.min() < touch < at.max():
         at = np.union1d(at, [touch])
-    states = [gripped.at(float(value), part) for value in np.sort(at)]
+    states = [held.at(float(value), part) for value in np.sort(at)]
     rows = {plate.kind: np.array([_cells(state, part) for state in states])}
     _write(rows, out / "grip.csv")
     _draw(rows, part, f"{plate.mechanism.name}, {asked.pair}", out / "grip.png")
-    beyond = gripped.at(touch + closing, part)
+    beyond = held.at(touch + closing, part)
     words = (
         f"{plate.kind}: a part of {part.width_mm:g} mm ({_stiff(part)}) between the probes of {asked.pair} is touched "
         f"at {touch:.4g} mm of input, and gripped by {beyond.grip_n:.4g} N per mm beyond. Model error of the grip: "
@@ -171,17 +171,16 @@ def _stiff(part: Part) -> str:
 
 def _closing_limit_mm(gripper: Gripper, model: Any, touch_mm: float | None) -> float:
     """Input (mm) at which closing ends: past the touch of the part by half the stroke that closes the empty fingers."""
-    touch = model.half.first_touch_mm() if hasattr(model, "half") else model.first_touch_mm()
+    touch = model.first_touch_mm
     reach = abs(touch) if touch is not None else 0.01 * gripper.body.height_mm
     return (touch_mm or 0.0) - 0.5 * reach
 
 
 def _row(model: Any, input_mm: float, part: Part) -> tuple[float, ...]:
-    if not hasattr(model, "half"):
+    if not isinstance(model, DrawnGripper):
         grip = model.grip_force_n(input_mm, part)
         return input_mm, np.nan, part.squeezed_mm(grip) if grip > 0.0 else np.nan, grip, np.nan, np.nan
-    state = grip_equilibrium(model.half, input_mm, part)
-    loaded = model.stressed(state)
+    loaded = gripped(model, input_mm, part)
     held = part.squeezed_mm(loaded.grip_n) if loaded.grip_n > _BEYOND_MM else np.nan
     return input_mm, loaded.gap_mm, held, loaded.grip_n, loaded.force_n, loaded.stress_mpa
 
@@ -189,14 +188,14 @@ def _row(model: Any, input_mm: float, part: Part) -> tuple[float, ...]:
 def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float, error: float) -> str:
     """Sentence on the inputs (mm) at which the part is touched and yields, and on the slope of the gripping force."""
     limit = gripper.material.yield_mpa
-    step = 0.2 * abs(model.half.first_touch_mm() or touch_mm)
-    near = [model.stressed(grip_equilibrium(model.half, touch_mm - by, part)) for by in (0.0, step)]
+    step = 0.2 * abs(model.first_touch_mm or touch_mm)
+    near = [gripped(model, touch_mm - by, part) for by in (0.0, step)]
     per_input = (near[1].grip_n - near[0].grip_n) / step
     at, most = touch_mm, near[1]
     while most.stress_mpa < limit and abs(at - touch_mm) < 50.0 * step:
         at -= step
-        most = model.stressed(grip_equilibrium(model.half, at, part))
-    before = model.stressed(grip_equilibrium(model.half, at + step, part))
+        most = gripped(model, at, part)
+    before = gripped(model, at + step, part)
     share = (limit - before.stress_mpa) / (most.stress_mpa - before.stress_mpa)
     grip = before.grip_n + share * (most.grip_n - before.grip_n)
     where = before.input_mm + share * (most.input_mm - before.input_mm)

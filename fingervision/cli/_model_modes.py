@@ -16,9 +16,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from fingervision.domain.errors import OutputError
-from fingervision.models.driven_body import DrivenBody
 from fingervision.models.kinds import by_trust
-from fingervision.models.mode_shapes import ModeShape, ModesWanted, gripper_mode_shapes
+from fingervision.models.mode_shapes import ModeShape
 
 _A_ROW = 6
 _PICTURES, _PERIODS, _A_SECOND = 24, 4, 24
@@ -31,18 +30,6 @@ _KILO = 1e4
 """Frequency (Hz) from which a title states kHz: with four digits, Hz would be printed as a power of ten."""
 _MARGIN = 0.02
 _MOST_FILM_MODES = 18
-
-
-def write_gripper_modes(
-    models: Mapping[str, Any], wanted: ModesWanted, name: str, out: Path, *, film: bool, as_json: bool
-) -> None:
-    """Write modes.csv for every kind of model with masses, and the plots of the most accurate of these kinds."""
-    found = {
-        kind: gripper_mode_shapes(model, wanted)
-        for kind, model in models.items()
-        if isinstance(getattr(model, "half", None), DrivenBody)
-    }
-    write_modes(found, name, out, film=film, as_json=as_json)
 
 
 def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, *, film: bool, as_json: bool) -> None:

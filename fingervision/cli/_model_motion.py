@@ -12,16 +12,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from fingervision.cli._model_frequency import Band, answer_frequencies, main_column, mechanism_frequencies, parse_band
+from fingervision.cli._model_frequency import Band, answer_frequencies, main_column, moving, parse_band
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import UsageError
 from fingervision.models.damping_text import parse_damping
-from fingervision.models.driven_body import DrivenBody
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.models.modal_model import ModalModel
+from fingervision.models.elastic_mechanism import ElasticMechanism
+from fingervision.models.gripper_model import DrawnGripper
+from fingervision.models.modal_model import GAP, ModalModel
 from fingervision.models.modal_response import Motion, modal_motion
-from fingervision.models.mode_shapes import ModesWanted, mechanism_mode_shapes, parse_modes
+from fingervision.models.mode_shapes import ModesWanted, mode_shapes, parse_modes
 from fingervision.models.motion_in_time import MODES, about_equilibria, check_small_vibration, gripper_motion
 from fingervision.storage.simulation_table import write_motion
 from fingervision.tables.read import read_drive
@@ -140,70 +139,67 @@ def motion_asked(
 
 
 def move(
-    models: Mapping[str, Any], asked: MotionAsked, name: str, folders: Mapping[str, Path], out: Path, *, as_json: bool
-) -> None:
-    """Compute all requested dynamic responses of a gripper's models."""
-    if asked.drive is not None:
-        follow_drive(models, asked.drive, asked.damping, name, folders, out, as_json=as_json)
-    if asked.band is not None:
-        answer_frequencies(models, asked.band, asked.damping, name, out, as_json=as_json)
-    if asked.modes is not None:
-        from fingervision.cli._model_modes import write_gripper_modes
-
-        write_gripper_modes(models, asked.modes, name, out, film=asked.film, as_json=as_json)
-
-
-def move_mechanism(
-    models: Mapping[str, MechanismPlate | MechanismFrame],
+    models: Mapping[str, Any],
     asked: MotionAsked,
-    static: Mapping[str, PchipInterpolator],
+    name: str,
     folders: Mapping[str, Path],
     out: Path,
     *,
+    static: Mapping[str, PchipInterpolator] | None = None,
     as_json: bool,
 ) -> None:
-    """Compute all requested dynamic responses of the models of a mechanism whose drawing lists its bodies.
+    """Compute all requested dynamic responses of the models of a drawing.
 
-    With large rotation or contact, `static` gives the equilibria of every kind: the observed lengths in order, then the
-    force.
+    With large rotation or contact, `static` gives the equilibria of every kind for a mechanism that is drawn by bodies:
+    the observed lengths in order, then the force.
     """
-    name = next(iter(models.values())).mechanism.name
     if asked.drive is not None:
-        mechanism_motion(models, asked.drive, asked.damping, static, folders, out, as_json=as_json)
+        _follow_drive(models, asked.drive, asked.damping, name, folders, out, static=static or {}, as_json=as_json)
     if asked.band is not None:
-        mechanism_frequencies(models, asked.band, asked.damping, out, as_json=as_json)
+        answer_frequencies(models, asked.band, asked.damping, name, out, as_json=as_json)
     if asked.modes is not None:
         from fingervision.cli._model_modes import write_modes
 
-        shapes = {kind: mechanism_mode_shapes(model, asked.modes) for kind, model in models.items()}
+        shapes = {
+            kind: mode_shapes(getattr(model, "elastic", model), asked.modes)
+            for kind, model in moving(models, "natural modes", as_json=as_json).items()
+        }
         write_modes(shapes, name, out, film=asked.film, as_json=as_json)
 
 
-def follow_drive(
+def _follow_drive(
     models: Mapping[str, Any], drive: DriveHistory, damping: str, name: str, folders: Mapping[str, Path], out: Path,
-    *, as_json: bool,
+    *, static: Mapping[str, PchipInterpolator], as_json: bool,
 ) -> None:  # fmt: skip
     """Write response.csv for every kind of model with masses, and one response.png that compares these kinds."""
     motions: dict[str, Motion] = {}
     shown: dict[str, Motion] = {}
-    for kind, model in models.items():
-        if not isinstance(getattr(model, "half", None), DrivenBody):
-            if not as_json:
-                click.echo(
-                    f"{kind} has no masses in the plane: for a drive, it gives static results only (simulation.csv)."
-                )
-            continue
-        found = gripper_motion(model, drive, parse_damping(damping))
-        motions[kind] = found.motion
-        finer = for_picture(drive, float(found.motion.modes_hz[0]))
-        sparse = finer.time_s.size > drive.time_s.size
-        shown[kind] = gripper_motion(model, finer, parse_damping(damping)).motion if sparse else found.motion
-        write_motion(folders[kind] / "response.csv", drive, found.motion.observed_mm, found.motion.force_n,
-                     symmetric=True)  # fmt: skip
+    column = ""
+    for kind, model in moving(models, "motion in time: it gives static results only", as_json=as_json).items():
+        if isinstance(model, DrawnGripper):
+            column = GAP
+            found = gripper_motion(model, drive, parse_damping(damping))
+            motion, method = found.motion, found.method
+        else:
+            reduced = model.modal_model(MODES)
+            column = column or main_column(reduced, name)
+            motion = _motion_of(model, reduced, drive, damping, static.get(kind), column)
+            about = " about the static equilibria, without contact" if kind in static else ""
+            method = f"{motion.modes_hz.size} modes{about}"
+        motions[kind] = shown[kind] = motion
+        finer = for_picture(drive, float(motion.modes_hz[0]))
+        if finer.time_s.size > drive.time_s.size:
+            shown[kind] = (
+                gripper_motion(model, finer, parse_damping(damping)).motion
+                if isinstance(model, DrawnGripper)
+                else _motion_of(model, reduced, finer, damping, static.get(kind), column)
+            )
+        write_motion(folders[kind] / "response.csv", drive, motion.observed_mm, motion.force_n,
+                     symmetric=isinstance(model, DrawnGripper))  # fmt: skip
         if not as_json:
-            click.echo(f"{kind} in time by {found.method}; {words_of(found.motion, 'gap_mm')}")
+            click.echo(f"{kind} in time by {method}; {words_of(motion, column)}")
     if motions:
-        draw_motion(shown, motions, "gap_mm", f"{name}, damping {damping}", out / "response.png")
+        draw_motion(shown, motions, column, f"{name}, damping {damping}", out / "response.png")
 
 
 def words_of(motion: Motion, column: str) -> str:
@@ -262,43 +258,8 @@ def _curves(motion: Motion, column: str) -> tuple[Array, Array, Array]:
     return seen, 1e3 * (seen - motion.static_mm[column]), motion.force_n
 
 
-def mechanism_motion(
-    models: Mapping[str, MechanismPlate | MechanismFrame],
-    drive: DriveHistory,
-    damping: str,
-    static: Mapping[str, PchipInterpolator],
-    folders: Mapping[str, Path],
-    out: Path,
-    *,
-    as_json: bool,
-) -> None:
-    """Write response.csv of every kind, and one response.png that compares them; see `move_mechanism`."""
-    motions: dict[str, Motion] = {}
-    shown: dict[str, Motion] = {}
-    column = ""
-    for kind, model in models.items():
-        reduced = model.modal_model(MODES)
-        if not reduced.observed:
-            raise UsageError(
-                f"{model.mechanism.name} must have a [[probe]] or a [[pair]] as the output of the response in time, "
-                "but has none: add one point ([[probe]]) or the distance of two ([[pair]])."
-            )
-        column = column or main_column(reduced)
-        curve = static.get(kind)
-        motion = motions[kind] = _motion_of(model, reduced, drive, damping, curve, column)
-        finer = for_picture(drive, float(reduced.modes_hz[0]))
-        sparse = finer.time_s.size > drive.time_s.size
-        shown[kind] = _motion_of(model, reduced, finer, damping, curve, column) if sparse else motion
-        write_motion(folders[kind] / "response.csv", drive, motion.observed_mm, motion.force_n)
-        if not as_json:
-            about = " about the static equilibria, without contact" if kind in static else ""
-            click.echo(f"{kind} in time by {motion.modes_hz.size} modes{about}; {words_of(motion, column)}")
-    title = f"{next(iter(models.values())).mechanism.name}, damping {damping}"
-    draw_motion(shown, motions, column, title, out / "response.png")
-
-
 def _motion_of(
-    model: MechanismPlate | MechanismFrame,
+    model: ElasticMechanism,
     reduced: ModalModel,
     drive: DriveHistory,
     damping: str,

@@ -1,5 +1,6 @@
 """Assembly of a mechanism: bodies cut from the drawing, meshed, condensed to coordinate frames, joined by flexures."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,14 +8,14 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, lil_matrix
 
 from fingervision.domain.errors import ModelError
+from fingervision.domain.gripper import PointMm
 from fingervision.models.body_frames import Frame, face_frame, nodes_of, pieces_of, section_frame
-from fingervision.models.condensed_bodies import CondensedBody, condensed
+from fingervision.models.condensed_bodies import CondensedBody, OwnModes, condensed
 from fingervision.models.corotational_body import CorotationalBody, turned_axes
 from fingervision.models.flexure_span import FlexureSpan
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_faces import driven_components, nodes_on, supports_of, turns_with
 from fingervision.models.plane_stress import PlaneStressPlate
-from fingervision.models.point_in_mesh import element_weights
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -56,42 +57,59 @@ class BodyAssembly:
     held: tuple[int, ...]
     by_drive: tuple[dict[int, float], ...]
 
-    def field(self, moved: Array) -> tuple[Array, csr_matrix]:
-        """Displacement of every node of the bodies in the deformed shape, and its derivative by the frames' motions."""
+    def field(self, moved: Array, nodes: Indices) -> tuple[Array, csr_matrix]:
+        """Displacement of nodes in the deformed shape (x and y of each), and its derivative by the frames' motions."""
         plate = self.plate
-        field = np.zeros(plate.unknowns)
-        slopes = lil_matrix((plate.unknowns, moved.size))
-        for number, (body, turning) in enumerate(zip(self.bodies, self.turning, strict=True)):
-            nodes = np.flatnonzero(self.piece == number)
-            x, y = plate.x_dofs[nodes], plate.y_dofs[nodes]
+        field = np.zeros((nodes.size, 2))
+        slopes = lil_matrix((2 * nodes.size, moved.size))
+        for number in np.unique(self.piece[nodes]).tolist():
+            body, turning = self.bodies[number], self.turning[number]
+            here = np.flatnonzero(self.piece[nodes] == number)
             own = moved[body.unknowns]
             local, by_motion = turning.strained(own), turning.slope(own)
             turn = turned_axes(float(own[2]))
-            bent = np.stack([body.shapes_mm[x], body.shapes_mm[y]])
-            arm = turn @ (plate.nodes_mm[:, nodes] - turning.places_mm[0][:, None] + bent @ local)
-            field[x], field[y] = arm + (turning.places_mm[0] + own[:2])[:, None] - plate.nodes_mm[:, nodes]
+            bent = np.stack([body.shapes_mm[dofs[nodes[here]]] for dofs in (plate.x_dofs, plate.y_dofs)])
+            rest = plate.nodes_mm[:, nodes[here]]
+            arm = turn @ (rest - turning.places_mm[0][:, None] + bent @ local)
+            field[here] = (arm + (turning.places_mm[0] + own[:2])[:, None] - rest).T
             slope = np.einsum("ij,jnk->ink", turn, bent @ by_motion)
             slope[0, :, 0] += 1.0
             slope[1, :, 1] += 1.0
             slope[0, :, 2] -= arm[1]
             slope[1, :, 2] += arm[0]
-            slopes[np.ix_(x, body.unknowns)], slopes[np.ix_(y, body.unknowns)] = slope[0], slope[1]
-        return field, csr_matrix(slopes)
+            for axis in (0, 1):
+                slopes[np.ix_(2 * here + axis, body.unknowns)] = slope[axis]
+        return field.ravel(), csr_matrix(slopes)
 
-    def motion_mm(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
-        """Displacement of a point of the nearest body, from the coordinate frames' motions (mm)."""
+    def small_field(self, moved: Array, own: Sequence[OwnModes] = ()) -> Array:
+        """Small displacements of all nodes of the plate by motions of the frames and, after them, of own modes."""
+        found = sum(body.shapes_mm @ moved[body.unknowns] for body in self.bodies)
+        at = moved.shape[0] - sum(modes.squared.size for modes in own)
+        for modes in own:
+            found = found + modes.shapes_mm @ moved[at : at + modes.squared.size]
+            at += modes.squared.size
+        return np.asarray(found)
+
+    def motion_mm(self, moved: Array, point: PointMm, own: Sequence[OwnModes] = (), *, large: bool) -> Array:
+        """Displacement of a point of the nearest body, shape (2,), or of every column of small displacements (mm)."""
         plate = self.plate
-        nodes, weights = element_weights(plate.nodes_mm, plate.nodes_of_triangles, point)
+        nodes, weights = plate.weights_at(point)
         number = int(self.piece[nodes[0]])
         body, turning = self.bodies[number], self.turning[number]
-        own = moved[body.unknowns]
-        bent = body.shapes_mm @ (turning.strained(own) if large else own)
-        carried = np.array([bent[plate.x_dofs[nodes]] @ weights, bent[plate.y_dofs[nodes]] @ weights])
+        dofs = plate.x_dofs[nodes], plate.y_dofs[nodes]
+        rows = np.stack([weights @ body.shapes_mm[part] for part in dofs])
+        motion = moved[body.unknowns]
         if not large:
-            return float(carried[0]), float(carried[1])
-        first = turning.places_mm[0]
-        x, y = first + own[:2] + turned_axes(float(own[2])) @ (np.array(point) + carried - first) - np.array(point)
-        return float(x), float(y)
+            found = rows @ motion
+            if own:
+                at = moved.shape[0] - sum(modes.squared.size for modes in own[number:])
+                shapes = own[number].shapes_mm
+                inner = moved[at : at + own[number].squared.size]
+                found = found + np.stack([weights @ shapes[part] for part in dofs]) @ inner
+            return np.asarray(found)
+        first, rest = turning.places_mm[0], np.array(point)
+        turn = turned_axes(float(motion[2]))
+        return np.asarray(first + motion[:2] + turn @ (rest + rows @ turning.strained(motion) - first) - rest)
 
 
 class _Frames:

@@ -40,15 +40,17 @@ class CondensedBody:
         Stiffness and mass matrices for small motions of the body's frames.
     shapes_mm : ndarray of float, shape (unknowns of the plate, 3 m)
         Displacements of the body for unit motions of its frames.
+    plate_unknowns : ndarray of int, shape (n,)
+        Unknowns of the plate that belong to this body.
     solve_held : callable
-        Maps loads on the plate to displacements of this body with its frames held; each of shape (unknowns of the
-        plate, k).
+        Maps loads on the body to its displacements with its frames held; each of shape (n, k).
     """
 
     frames: tuple[int, ...]
     stiffness_n_mm: Array
     mass_t: Array
     shapes_mm: Array
+    plate_unknowns: Indices
     solve_held: Callable[[Array], Array]
 
     @property
@@ -115,12 +117,12 @@ def condensed(
     mass = moved.T @ (M @ moved)
 
     def solve_held(loads: Array) -> Array:
-        found = np.zeros_like(loads)
-        held = np.vstack([loads[unknowns], np.zeros((rows.shape[0], loads.shape[1]))])
-        found[unknowns] = solver.solve(held)[: unknowns.size]
-        return found
+        held = np.vstack([loads, np.zeros((rows.shape[0], loads.shape[1]))])
+        return np.asarray(solver.solve(held)[: unknowns.size])
 
-    return CondensedBody(tuple(places), 0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T), shapes, solve_held)
+    return CondensedBody(
+        tuple(places), 0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T), shapes, unknowns, solve_held
+    )
 
 
 def own_modes(plate: PlaneStressPlate, body: CondensedBody, count: int) -> OwnModes:
@@ -128,13 +130,18 @@ def own_modes(plate: PlaneStressPlate, body: CondensedBody, count: int) -> OwnMo
 
     Source: Bathe, Finite Element Procedures, section 11.6.
     """
-    K, M = plate.stiffness_n_mm, plate.mass_t
+    own = body.plate_unknowns
+    K, M = (matrix[own][:, own] for matrix in (plate.stiffness_n_mm, plate.mass_t))
     count = min(count, int(np.count_nonzero(np.any(body.shapes_mm, axis=1))) // 4)
-    moved = np.random.default_rng(0).standard_normal((plate.unknowns, 2 * count + 2))
+    if count == 0:
+        return OwnModes(np.zeros(0), np.zeros((body.shapes_mm.shape[1], 0)), np.zeros((plate.unknowns, 0)))
+    moved = np.random.default_rng(0).standard_normal((plate.unknowns, 2 * count + 2))[own]
     squared = np.ones(1)
     for _ in range(_ITERATIONS):
         moved = body.solve_held(M @ moved)
         squared, turned = eigh(moved.T @ (K @ moved), moved.T @ (M @ moved))
         moved = moved @ turned
     kept = moved[:, :count]
-    return OwnModes(squared[:count], body.shapes_mm.T @ (M @ kept), kept)
+    shapes = np.zeros((plate.unknowns, count))
+    shapes[own] = kept
+    return OwnModes(squared[:count], body.shapes_mm[own].T @ (M @ kept), shapes)

@@ -5,7 +5,7 @@ face is its distance from the nearest straight segment of the other face, or fro
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,37 @@ _OVERHANG = 0.05
 still touch it. Faces that meet corner to corner slide a little past each other and would otherwise lose contact."""
 _PENETRATES = 1e-6
 """Overlap of two faces at rest, as a share of the body's size, above which the drawing is refused as wrong."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactNodes:
+    """The nodes of a contact alone, without the rest of their mesh.
+
+    Parameters
+    ----------
+    places : ndarray of int, shape (k,)
+        Indices of the nodes in the mesh.
+    nodes_mm : ndarray of float, shape (2, k)
+        Positions of the nodes at rest; the motion of node i has the components 2 i and 2 i + 1.
+    """
+
+    places: Indices
+    nodes_mm: Array
+
+    @property
+    def x_dofs(self) -> Indices:
+        """Components along x."""
+        return 2 * np.arange(self.places.size)
+
+    @property
+    def y_dofs(self) -> Indices:
+        """Components along y."""
+        return self.x_dofs + 1
+
+    @property
+    def unknowns(self) -> int:
+        """Number of components."""
+        return 2 * self.places.size
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +89,13 @@ class ContactPair:
         del nodes
         return np.asarray(count[place].reshape(self.segments.shape) == 1)
 
-    def gaps_mm(self, plate: PlaneStressPlate, moved: Array) -> tuple[Array, csr_matrix, Bend]:
+    def alone(self, plate: PlaneStressPlate) -> tuple[ContactNodes, "ContactPair"]:
+        """Return the nodes of this contact, and the contact with indices among these nodes."""
+        places = np.unique(np.concatenate([self.nodes, self.segments.ravel()]))
+        own = replace(self, nodes=np.searchsorted(places, self.nodes), segments=np.searchsorted(places, self.segments))
+        return ContactNodes(places, plate.nodes_mm[:, places]), own
+
+    def gaps_mm(self, plate: PlaneStressPlate | ContactNodes, moved: Array) -> tuple[Array, csr_matrix, Bend]:
         """Gap of every node, infinite for a node that faces no segment, with its first and second derivatives.
 
         Returns

@@ -19,7 +19,7 @@ from scipy.sparse import bmat, csr_matrix, kron
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fingervision.domain.gripper import Material
-from fingervision.models.driven_body import factorised
+from fingervision.models.mechanism_equilibrium import factorised
 from fingervision.models.plane_mesh import PlaneMesh
 from fingervision.models.point_in_mesh import element_weights
 

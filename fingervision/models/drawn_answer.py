@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fingervision.domain.gripper import Gripper
-from fingervision.models.driven_body import DrivenBody
+from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.small_answer import RatioCurves
 
@@ -18,8 +18,8 @@ class DrawnAnswer:
         The drawing.
     theory : HingeTheory
         Theory of the hinges' compliance.
-    body : DrivenBody
-        The elastic right half, as this kind of model computes it.
+    model : DrawnGripper
+        The gripper for small displacements, as this kind of model computes it.
     input_range_mm : (float, float)
         Smallest and largest input for which the model is valid.
     lever : RatioCurves or None
@@ -29,6 +29,6 @@ class DrawnAnswer:
 
     gripper: Gripper
     theory: HingeTheory
-    body: DrivenBody
+    model: DrawnGripper
     input_range_mm: tuple[float, float]
     lever: RatioCurves | None

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
+from fingervision.models.elastic_mechanism import LargestStress
 from fingervision.models.flexure_span import FlexureSpan
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.hinge_stress import notch_factors
@@ -61,10 +62,12 @@ def fillet_factors(thickness_mm: float, fillet_mm: float, depth_mm: float) -> tu
 _SAMPLES = 401
 
 
-def nominal_stress_mpa(
+def nominal_stress(
     span: FlexureSpan, end_loads: Array, mechanism: Mechanism, theory: HingeTheory, *, width_effect: bool = True
-) -> float:
+) -> LargestStress:
     """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) over the free length of a flexure.
+
+    It is on the side of the section where tension and bending stresses add.
 
     Parameters
     ----------
@@ -100,7 +103,10 @@ def nominal_stress_mpa(
         held = float(np.sqrt(1.0 - across + across**2))
     stress = factors[0] * np.abs(tension) / (plate_mm * height)
     stress += factors[1] * 6.0 * np.abs(moment) / (plate_mm * height**2)
-    return float(held * stress.max())
+    highest = int(np.argmax(stress))
+    side = float(np.sign(tension[highest]) * np.sign(moment[highest])) or 1.0
+    place = span.flexure.point_mm(float(x[highest]), -0.5 * side * float(height[highest]))
+    return LargestStress(float(held * stress[highest]), place)
 
 
 def _factors(span: FlexureSpan, plate_mm: float) -> tuple[float, float]:

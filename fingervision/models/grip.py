@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fingervision.models.driven_body import DrivenBody, Equilibrium
-from fingervision.models.signorini import contact_forces_n
-
-Array = NDArray[np.float64]
+from fingervision.models.answer_figures import LoadedState
+from fingervision.models.gripper_model import DrawnGripper
+from fingervision.models.mechanism_equilibrium import MechanismEquilibrium
 
 _BEYOND_TOUCH = 0.05
 """Step beyond the input of first touch, as a share of that input: large beside rounding errors, and so small that no
@@ -42,54 +40,46 @@ class Part:
         return self.width_mm - grip_n / self.stiffness_n_mm
 
 
-def grip_equilibrium(body: DrivenBody, input_mm: float, part: Part) -> Equilibrium:
+def grip_equilibrium(model: DrawnGripper, input_mm: float, part: Part) -> MechanismEquilibrium:
     """Compute the small displacements of the gripper with a part between the fingers.
 
     Parameters
     ----------
-    body : DrivenBody
-        The right half.
+    model : DrawnGripper
+        The gripper.
     input_mm : float
         Displacement of the drive.
     part : Part
         The part between the fingers.
-
-    Returns
-    -------
-    Equilibrium
-        Equilibrium of the right half; its contact forces are those of the part on each point of one finger's face, and
-        their sum is the gripping force.
     """
-    moved = input_mm * body.unit_displacement_mm
-    free_gap = body.face_gap_mm(moved) - 0.5 * part.width_mm
-    pressed = np.zeros(body.face.size)
-    if free_gap.min() < 0.0:
-        compliance = body.face_displacement_mm[body.face]
-        yielding = 0.5 * (compliance + compliance.T) + 0.5 / part.stiffness_n_mm
-        pressed = contact_forces_n(yielding, free_gap)
-        moved = moved + body.face_displacement_mm @ pressed
-    force_n = 2.0 * float((body.stiffness_n_mm @ moved)[body.driven].sum())
-    return Equilibrium(input_mm, moved, force_n, pressed)
+    yielding_mm_n = 0.5 / part.stiffness_n_mm / model.elastic.mechanism.halves
+    return model.elastic.driven.equilibrium(input_mm, contact=True, between=(0.5 * part.width_mm, yielding_mm_n))
 
 
-def first_grip_mm(body: DrivenBody, part: Part) -> float | None:
+def gripped(model: DrawnGripper, input_mm: float, part: Part) -> LoadedState:
+    """Gap, forces and stress with a part between the fingers; the grip is the force of one finger."""
+    return model.stressed(input_mm, grip_equilibrium(model, input_mm, part))
+
+
+def first_grip_mm(model: DrawnGripper, part: Part) -> float | None:
     """Input at which a finger first touches the part (mm); None if the fingers do not move towards it."""
-    slope = body.unit_displacement_mm[body.face]
+    slope, rest_mm = model.face_per_input, model.elastic.contact_points_mm[0][0]
     closing = slope > 0.0
     if not closing.any():
         return None
-    return float(np.max((0.5 * part.width_mm - body.face_rest_mm[closing]) / slope[closing]))
+    return float(np.max((0.5 * part.width_mm - rest_mm[closing]) / slope[closing]))
 
 
-def mechanical_advantage(body: DrivenBody) -> float | None:
+def mechanical_advantage(model: DrawnGripper) -> float | None:
     """Increase of each finger's gripping force per increase of drive force, once the fingers touch each other.
 
     The part of the drive's work that does not increase the grip bends hinges and fingers. The function returns None for
     fingers that do not close.
     """
-    touch = body.first_touch_mm()
+    touch = model.first_touch_mm
     if touch is None:
         return None
-    states = [body.equilibrium(touch * (1.0 + by), contact=True) for by in (0.0, _BEYOND_TOUCH)]
-    grip = [float(state.contact_n.sum()) for state in states]
+    driven = model.elastic.driven
+    states = [driven.equilibrium(touch * (1.0 + by), contact=True) for by in (0.0, _BEYOND_TOUCH)]
+    grip = [float(state.pressed_n[0].sum()) / model.elastic.mechanism.halves for state in states]
     return (grip[1] - grip[0]) / abs(states[1].force_n - states[0].force_n)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import ModelFigures
-from fingervision.models.driven_body import DrivenBody
 from fingervision.models.endurance import Endurance, endurance
-from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.grip import mechanical_advantage
-from fingervision.models.steady_loads import gap_and_force_by_strain, gap_by_weight_mm, midline_by_weight_mm
+from fingervision.models.gripper_model import DrawnGripper
+from fingervision.models.mechanism_loads import per_kelvin
+from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.yield_limit import opening_at_yield_mm
 
 # Characteristic numbers of a gripper in operation: leverage, parasitic motion, effects of weight and temperature.
@@ -51,37 +51,23 @@ class OperatingFigures:
     force_per_kelvin_n: float | None
 
 
-def operating_figures(gripper: Gripper, body: DrivenBody) -> OperatingFigures:
-    """Compute the characteristic numbers of a gripper in operation.
-
-    Parameters
-    ----------
-    gripper : Gripper
-        The drawing.
-    body : DrivenBody
-        Right half of the gripper from any kind of model, such as `LumpedGripper(gripper).half`.
-    """
-    moved = body.unit_displacement_mm
-    along = np.zeros(body.unknowns, dtype=np.int64)
-    along[body.nodes[:, 0]] = body.nodes[:, 1]
-    height = np.zeros(body.unknowns)
-    height[body.nodes[:, 0]] = body.nodes_mm[:, 1]
-    y_mm, across = height[body.face], moved[body.face]
-    lean = float(np.polyfit(y_mm - y_mm.mean(), across, 1)[0])
-    expansion = gripper.material.thermal_expansion_per_k
-    gap, force = (
-        (None, None)
-        if expansion is None
-        else (expansion * x for x in gap_and_force_by_strain(body, gripper.lever.drive_face_y_mm))
-    )
+def operating_figures(model: DrawnGripper) -> OperatingFigures:
+    """Compute the characteristic numbers of a gripper in operation."""
+    elastic = model.elastic
+    moved = elastic.driven.unit_displacement
+    y_mm = elastic.contact_points_mm[0][1]
+    lean = float(np.polyfit(y_mm - y_mm.mean(), model.face_per_input, 1)[0])
+    # A frame of bars or beams cannot give thermal expansion: its bars end where their axes meet, and the error exceeds
+    # the sample's change.
+    warmed = per_kelvin(elastic) if isinstance(elastic, MechanismPlate) else None
     return OperatingFigures(
-        mechanical_advantage=mechanical_advantage(body),
-        tip_along_per_input=float(body.weights @ moved[along[body.measured]]),
+        mechanical_advantage=mechanical_advantage(model),
+        tip_along_per_input=float(elastic.motion_mm(moved, model.gripper.measuring_point_mm, large=False)[1]),
         tip_turn_deg_per_mm=float(np.degrees(lean)),
-        gap_by_weight_mm=gap_by_weight_mm(body),
-        midline_by_weight_mm=midline_by_weight_mm(body),
-        gap_per_kelvin_mm=gap,
-        force_per_kelvin_n=force,
+        gap_by_weight_mm=model.gap_change_mm(elastic.under_weight((0.0, -1.0))),
+        midline_by_weight_mm=model.midline_by_weight_mm(),
+        gap_per_kelvin_mm=None if warmed is None else model.gap_change_mm(warmed[0]),
+        force_per_kelvin_n=None if warmed is None else warmed[1],
     )
 
 
@@ -139,13 +125,8 @@ def gripper_figures(
     }
     at_yield = row["input_at_yield_mm"]
     row["gap_at_yield_mm"] = None if at_yield is None else model.loaded([at_yield])[0].gap_mm
-    half = getattr(model, "half", None)
-    own = asdict(operating_figures(gripper, half)) if isinstance(half, DrivenBody) else {}
+    own = asdict(operating_figures(model)) if isinstance(model, DrawnGripper) else {}
     row |= {field.name: own.get(field.name) for field in fields(OperatingFigures)}
-    if not isinstance(model, FiniteElementGripper):
-        # A frame of bars cannot give thermal expansion: its bars end where their axes meet, and the error exceeds the
-        # sample's change.
-        row["gap_per_kelvin_mm"] = row["force_per_kelvin_n"] = None
     row["sag_out_of_plane_mm"] = figures.sag_out_of_plane_mm
     ends = [float(min(inputs)), float(max(inputs))]
     if peak is not None:

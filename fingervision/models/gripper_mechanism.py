@@ -11,14 +11,13 @@ _FAR = 3.0
 """Extent of the wall on the symmetry axis, as a multiple of the largest coordinate of the body."""
 
 
-def half_mechanism(gripper: Gripper, name: str = "gripper, right half") -> Mechanism:
-    """Describe the right half as a mechanism that slides along the symmetry axis; its tip may touch that axis.
+def half_mechanism(gripper: Gripper, name: str = "gripper") -> Mechanism:
+    """Describe a gripper of two equal halves by its right half, which slides along the symmetry axis.
 
-    The gap is twice the distance of the probe `tip` from the axis, and the force of the whole gripper is twice the
-    half's force at the drive.
+    Both tips may touch that axis.
     """
     x0, x1, low, high = _drive_box(gripper)
-    top = gripper.links.drive_block_mm[3]
+    top, y = gripper.links.drive_block_mm[3], gripper.measuring_point_mm[1]
     reach = _FAR * max(abs(gripper.body.width_mm), gripper.body.height_mm)
     face = (gripper.tip_corner_mm[0],) * 2 + (gripper.tip_heel_mm[1], gripper.tip_corner_mm[1])
     return Mechanism(
@@ -31,9 +30,10 @@ def half_mechanism(gripper: Gripper, name: str = "gripper, right half") -> Mecha
         fixed=(_foot(gripper, 1.0, "clamp"),),
         slides=((Face("symmetry axis", (0.0, 0.0, low, top)), "x"),),
         drives=(Drive(Face("drive", (max(x0, 0.0), x1, low, high)), (0.0, 1.0), "free"),),
-        probes={"tip": gripper.measuring_point_mm},
-        pairs={},
+        probes={"left tip": (-gripper.measuring_point_mm[0], y), "right tip": (gripper.measuring_point_mm[0], y)},
+        pairs={"gap": ("left tip", "right tip")},
         contacts=(Contact("tip", Face("tip", face), None, ((0.0, -reach), (0.0, reach))),),
+        mirrored=True,
     )
 
 

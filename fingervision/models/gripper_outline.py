@@ -4,15 +4,15 @@ One half of the gripper is the union of its bars and polygons, minus four notch 
 symmetry axis.
 """
 
-from functools import lru_cache
 from math import atan2, cos, degrees, radians, sin
 
 import numpy as np
 
 from fingervision.domain.errors import DataError, FingervisionError
-from fingervision.domain.gripper import Gripper, Hinge, Lever, Links, PointMm
+from fingervision.domain.gripper import Gripper, PointMm
+from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.planar_region import PlanarRegion
-from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box
+from fingervision.models.plane_shapes import bar
 
 _ON = 1e-6
 """Distance on either side of a face at which material and void are tested, as a share of the gripper's height."""
@@ -28,10 +28,7 @@ computation."""
 
 def notch_centres_mm(gripper: Gripper) -> tuple[PointMm, ...]:
     """Centres of the four discs that cut the two hinges: radius + thickness / 2 on either side of each hinge's axis."""
-    return _notch_centres_mm(gripper.hinge, gripper.lever)
-
-
-def _notch_centres_mm(hinge: Hinge, lever: Lever) -> tuple[PointMm, ...]:
+    hinge, lever = gripper.hinge, gripper.lever
     offset_mm = hinge.radius_mm + hinge.thickness_mm / 2.0
     centres: list[PointMm] = []
     for (x_mm, y_mm), axis_deg in ((lever.hinge1_mm, lever.hinge1_axis_deg), (lever.hinge2_mm, lever.hinge2_axis_deg)):
@@ -42,29 +39,7 @@ def _notch_centres_mm(hinge: Hinge, lever: Lever) -> tuple[PointMm, ...]:
 
 def half_region(gripper: Gripper) -> PlanarRegion:
     """The right half as a sequence of shapes added and removed; its outline is computed once per drawing."""
-    face = (gripper.lever.drive_face_half_width_mm, gripper.lever.drive_face_y_mm)
-    return _half_region(gripper.hinge, gripper.lever, gripper.links, (face,))
-
-
-@lru_cache(maxsize=32)
-def _half_region(hinge: Hinge, lever: Lever, links: Links, marks: tuple[PointMm, ...]) -> PlanarRegion:
-    added: tuple[Polygon, ...] = (
-        box(*links.pillar_and_root_mm),
-        bar(*links.shuttle_from_mm, *links.shuttle_to_mm, links.shuttle_width_mm),
-        box(*links.drive_block_mm),
-        bar(*links.cross_bar_mm, links.cross_bar_width_mm),
-        bar(*links.finger_mm, links.finger_width_mm),
-        Polygon(links.tip_polygon_mm),
-    )
-    discs: list[Shape] = [
-        Ellipse(centre, (hinge.radius_mm, hinge.radius_mm)) for centre in _notch_centres_mm(hinge, lever)
-    ]
-    corners = np.concatenate([np.array(shape.corners_mm) for shape in added])
-    far = 3.0 * float(np.abs(corners).max())
-    cut = [*discs, box(-far, 0.0, -far, far)]
-    steps: list[tuple[bool, Shape]] = [(True, shape) for shape in added]
-    steps += [(False, shape) for shape in cut]
-    return PlanarRegion(tuple(steps), marks)
+    return half_mechanism(gripper).region
 
 
 def check_outline(gripper: Gripper, origin: str = "the drawing") -> None:

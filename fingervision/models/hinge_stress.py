@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
-from fingervision.models.answer_figures import PeakStress
-from fingervision.models.corotational_frame import CorotationalFrame
+from fingervision.models.elastic_mechanism import LargestStress
 from fingervision.models.hinge_correction import HingeTheory, plane_strain_share
-from fingervision.models.joined_frame import JoinedFrame
 from fingervision.models.notch import Notch, notches_of
 from fingervision.models.skeleton import Member, Skeleton
 
@@ -29,7 +27,7 @@ _PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 
 def peak_hinge_stress(
     gripper: Gripper, skeleton: Skeleton, displacement: Array, theory: HingeTheory = HingeTheory.BEAM
-) -> PeakStress:
+) -> LargestStress:
     """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) in the hinges, nominal or with notch factors.
 
     Parameters
@@ -46,7 +44,7 @@ def peak_hinge_stress(
 
     Returns
     -------
-    PeakStress
+    LargestStress
         Stress at that input, on the side of the section where tension and bending stresses add.
     """
     moved = displacement.reshape(-1, 3)
@@ -60,26 +58,15 @@ def peak_hinge_stress(
             strained = np.append(axes @ (second[:2] - carried), second[2] - first[2])
             tension_n, shear_n, moment_n_mm = np.linalg.solve(member.compliance[_PLANAR], strained)
             loads[place] = tension_n, moment_n_mm + shear_n * float(np.hypot(*(end - start))), moment_n_mm
-    return _peak(gripper, skeleton, loads, theory)
+    return peak_of_loads(gripper, skeleton, loads, theory)
 
 
-def peak_in_deformed_shape(
-    gripper: Gripper,
-    skeleton: Skeleton,
-    frame: CorotationalFrame | JoinedFrame,
-    displacement: Array,
-    theory: HingeTheory,
-) -> PeakStress:
-    """Find the largest hinge stress in the deformed shape, with loads in axes that rotate with the material."""
-    return _peak(gripper, skeleton, frame.end_loads(displacement) * np.array([1.0, -1.0, 1.0]), theory)
-
-
-def _peak(gripper: Gripper, skeleton: Skeleton, loads: Array, theory: HingeTheory) -> PeakStress:
+def peak_of_loads(gripper: Gripper, skeleton: Skeleton, loads: Array, theory: HingeTheory) -> LargestStress:
     """Largest stress, from tension and end moments of every member (`loads`, shape (members, 3))."""
     lever = gripper.lever
     first, second = notches_of(gripper)
     hinges = {"hinge 1": (lever.hinge1_mm, first), "hinge 2": (lever.hinge2_mm, second)}
-    peak = PeakStress(0.0, lever.hinge1_mm)
+    peak = LargestStress(0.0, lever.hinge1_mm)
     way = np.linspace(0.0, 1.0, _SAMPLES)
     for member, (tension_n, at_start, at_end) in zip(skeleton.members, loads.tolist(), strict=True):
         if member.name not in hinges:
@@ -97,10 +84,10 @@ def _peak(gripper: Gripper, skeleton: Skeleton, loads: Array, theory: HingeTheor
             across = plane_strain_share(notch) * gripper.material.poisson_ratio
             stress *= sqrt(1.0 - across + across**2)
         highest = int(np.argmax(stress))
-        if stress[highest] > peak.mpa_per_mm:
+        if stress[highest] > peak.mpa:
             side = np.sign(tension_n) * np.sign(moment_n_mm[highest]) or 1.0
             x, y = places[highest] - 0.5 * side * height_mm[highest] * axes[1]
-            peak = PeakStress(float(stress[highest]), (float(x), float(y)))
+            peak = LargestStress(float(stress[highest]), (float(x), float(y)))
     return peak
 
 

@@ -1,6 +1,6 @@
 """Description of a planar flexure mechanism, as given by its drawing: bodies, flexures, supports, drive, probes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, pi
 from typing import Literal
 
@@ -103,6 +103,9 @@ class Mechanism:
         Faces that may touch.
     body_names : tuple of str
         Names of `bodies`, in their order; empty for a shape without one.
+    mirrored : bool
+        Whether bodies, flexures and faces are the right half of a mechanism whose left half is its mirror image in the
+        line x = 0. Forces of drives are those of both halves; a probe with x < 0 lies on the left half.
     """
 
     name: str
@@ -117,6 +120,20 @@ class Mechanism:
     pairs: dict[str, tuple[str, str]]
     contacts: tuple[Contact, ...] = ()
     body_names: tuple[str, ...] = ()
+    mirrored: bool = False
+
+    @property
+    def halves(self) -> float:
+        """Number of equal parts of the mechanism of which one is drawn: 2 for a mirrored drawing, else 1."""
+        return 2.0 if self.mirrored else 1.0
+
+    @property
+    def swaying(self) -> "Mechanism":
+        """The half of a mirrored drawing whose other half moves the same way sideways, with its drive not guided.
+
+        Points on the symmetry axis then cannot move along the axis.
+        """
+        return replace(self, slides=tuple((face, "y") for face, _ in self.slides), drives=(), contacts=())
 
     @property
     def width_error(self) -> float:
@@ -189,6 +206,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
                     "or move one of them."
                 )
     for probe, (x, y) in mechanism.probes.items():
+        x = abs(x) if mechanism.mirrored else x
         ring = np.array([[x + 1e-6 * size * dx, y + 1e-6 * size * dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)]).T
         if not region.holds(ring).any():
             raise DataError(f"probe {probe} of {name} must lie on the body, but ({x:g}, {y:g}) mm is outside it.")

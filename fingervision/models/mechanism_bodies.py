@@ -3,11 +3,12 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.models.flexure_span import FlexureSpan, span_of
+from fingervision.models.flexure_span import span_of
 from fingervision.models.mechanism import Face, Mechanism
 from fingervision.models.planar_region import Loop, PlanarRegion
 from fingervision.models.plane_shapes import Polygon, Shape
@@ -24,6 +25,11 @@ _SAMPLES = 24
 found."""
 _ON = 1e-6
 """Distance from a face's box within which the outline counts as lying on it, as a share of the drawing's size."""
+
+
+_KEPT: dict[Any, "tuple[LinkBody, ...]"] = {}
+_MOST_KEPT = 8
+"""Number of drawings whose bodies are kept: they take half a second to cut out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,19 +63,19 @@ class LinkBody:
         return inside
 
 
-def bodies_of(mechanism: Mechanism, spans: Sequence[FlexureSpan] | None = None) -> tuple[LinkBody, ...]:
-    """Divide a mechanism into its bodies.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        The drawing, already checked.
-    spans : sequence of FlexureSpan, or None
-        The mechanism's flexures with the positions at which they are cut from the bodies; None computes these.
-    """
+def bodies_of(mechanism: Mechanism) -> tuple[LinkBody, ...]:
+    """Divide a mechanism, whose drawing is already checked, into its bodies; cached, because every model uses them."""
     region = mechanism.region
-    if spans is None:
-        spans = [span_of(flexure, region) for flexure in mechanism.flexures]
+    key = (region.steps, region.marks_mm, mechanism.flexures, mechanism.body_names, mechanism.fixed)
+    if key not in _KEPT:
+        while len(_KEPT) >= _MOST_KEPT:
+            _KEPT.pop(next(iter(_KEPT)))
+        _KEPT[key] = _divided(mechanism, region)
+    return _KEPT[key]
+
+
+def _divided(mechanism: Mechanism, region: PlanarRegion) -> tuple[LinkBody, ...]:
+    spans = [span_of(flexure, region) for flexure in mechanism.flexures]
     cut = PlanarRegion((*region.steps, *((False, span.slab) for span in spans)), region.marks_mm)
     outer = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
     inner = [loop for loop in cut.loops if loop.area_mm2 < 0.0]

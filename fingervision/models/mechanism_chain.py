@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import ModelError
+from fingervision.models.elastic_mechanism import MechanismState, named_forces_n, pair_distances_mm
 from fingervision.models.flexure_span import FlexureSpan, span_of
-from fingervision.models.flexure_stress import nominal_stress_mpa
+from fingervision.models.flexure_stress import nominal_stress
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Face, Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of
 from fingervision.models.mechanism_faces import driven_components, per_input_of
 from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_state import MechanismState, named_forces_n, pair_distances_mm
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.rigid_motion import MRAD, BodyPose
 
@@ -59,7 +59,7 @@ class MechanismChain:
         spans = [span_of(flexure, region) for flexure in mechanism.flexures]
         cut = PlanarRegion((*region.steps, *((False, span.slab) for span in spans)), region.marks_mm)
         self._bodies = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
-        self.bodies: tuple[LinkBody, ...] = bodies_of(mechanism, spans)
+        self.bodies: tuple[LinkBody, ...] = bodies_of(mechanism)
         # Bodies are rigid, so that a leaf bends over its whole free length.
         self.spans = [span if span.flexure.is_notch else replace(span, cut_mm=span.free_mm) for span in spans]
         self._joins = [self._joined(span) for span in spans]
@@ -307,7 +307,7 @@ class MechanismChain:
                 tension += float(pull * np.cos(angle) + push * np.sin(angle))
                 moment = moment + turn + (at[0] - x) * push - (at[1] - y) * pull
         rows = np.column_stack([np.full(stations.size - 1, tension), -moment[:-1], moment[1:]])
-        return nominal_stress_mpa(span, rows, self.mechanism, self.theory)
+        return nominal_stress(span, rows, self.mechanism, self.theory).mpa
 
 
 def _carried(arm: Array) -> Array:

@@ -1,16 +1,17 @@
 """Equilibria of a driven mechanism of any kind: small or large displacements, with or without contact."""
 
+from bisect import insort
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix, vstack
-from scipy.sparse.linalg import SuperLU
+from scipy.linalg import eigh
+from scipy.sparse import csr_matrix, hstack, vstack
+from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from fingervision.domain.errors import ModelError
-from fingervision.models.driven_body import factorised
 from fingervision.models.signorini import contact_forces_n
 
 Array = NDArray[np.float64]
@@ -25,15 +26,24 @@ _RESIDUAL = 1e-8
 _ON = 1e-6
 """Tolerance of contact as a share of the input: largest gap of a touching node, and largest penetration before a node
 is held."""
+_TOUCHES = 1e-7
+"""Gap, as a share of the input, at which a node counts as just touching."""
 _SLOW = 0.1
 """Ratio of successive residuals below which the present tangent is kept; a new tangent costs as much as ten steps."""
 _MOST_MOTION = 1e6
 """Motion in millimetres per 1 mm of input above which the mechanism counts as not supported; no real mechanism
 amplifies as much."""
+_DENSE_BELOW = 1000
+"""Number of unknowns below which natural modes are found with full matrices."""
 _STILL = 1e-9
 _STRAINLESS = 1e-8
 """Strain energy under all drives together, as a share of the strain energies under each drive alone, below which the
 body counts as moving rigidly; rounding errors give 1e-11."""
+
+
+def factorised(matrix: csr_matrix) -> SuperLU:
+    """Factorise a symmetric matrix with an ordering and pivoting that is a sixth faster than SuperLU's default."""
+    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +68,16 @@ class MechanismEquilibrium:
     pressed_n: tuple[Array, ...]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Reached:
+    """Equilibrium in the deformed shape: size of the input (mm), displacements, touching nodes and their forces (N)."""
+
+    size_mm: float
+    moved: Array
+    touching: Flags
+    pressed: Array
+
+
 @dataclass(frozen=True, eq=False)
 class DrivenMechanism:
     """A driven elastic mechanism.
@@ -77,6 +97,8 @@ class DrivenMechanism:
         Prescribed motion per 1 mm of every driven face.
     per_input : ndarray of float, shape (drives,)
         Motion of every driven face per 1 mm of input.
+    mass : callable
+        Returns the mass matrix in tonnes; called when it is first needed, because static results do not need it.
     gaps : tuple of callable
         For every contact pair, a function that maps displacements to the gaps of its nodes (infinite for a node that
         faces nothing) and their derivatives.
@@ -88,7 +110,18 @@ class DrivenMechanism:
     motions: csr_matrix
     by_drive: Array
     per_input: Array
+    mass: Callable[[], csr_matrix]
     gaps: Pairs = ()
+
+    @property
+    def unknowns(self) -> int:
+        """Number of displacement components."""
+        return int(self.by_drive.shape[0])
+
+    @cached_property
+    def mass_t(self) -> csr_matrix:
+        """Mass matrix in tonnes."""
+        return self.mass()
 
     @cached_property
     def by_input(self) -> Array:
@@ -163,6 +196,35 @@ class DrivenMechanism:
         """Small displacements under one load, or under each column of loads, with the drive fixed."""
         return np.asarray(self.motions @ self._solver.solve(np.ascontiguousarray(self.motions.T @ load_n)))
 
+    def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array, Array]:
+        """First natural modes, with the drive fixed or free to move along its direction.
+
+        Returns
+        -------
+        rad_s : ndarray of float, shape (count,)
+            Angular frequencies, in rising order.
+        shapes : ndarray of float, shape (unknowns, count)
+            Mode shapes of unit modal mass.
+        drive : ndarray of float, shape (count,)
+            Motion of the input in each mode; zero with the drive held.
+        """
+        columns = self.motions
+        if not drive_held:
+            columns = hstack([columns, csr_matrix(self.by_input[:, None])], format="csr")
+        K, M = ((columns.T @ matrix @ columns).tocsc() for matrix in (self.stiffness_n_mm, self.mass_t))
+        size = K.shape[0]
+        if size < _DENSE_BELOW:
+            # Solve the reciprocal eigenvalue problem: masses may be zero, whereas the stiffness is positive definite.
+            inverse, sought = eigh(M.toarray(), K.toarray(), subset_by_index=(size - count, size - 1))
+            squared, sought = 1.0 / inverse, sought / np.sqrt(inverse)
+        else:
+            solver = self._solver if drive_held else factorised(K)
+            by_load = LinearOperator(K.shape, solver.solve, dtype=np.float64)
+            squared, sought = eigsh(K, count, M, sigma=0.0, OPinv=by_load, v0=np.ones(size))
+        order = np.argsort(squared)
+        drive = np.zeros(count) if drive_held else sought[-1, order]
+        return np.sqrt(squared[order]), np.asarray(columns @ sought[:, order]), drive
+
     def touch_inputs_mm(self) -> list[float | None]:
         """Input nearest to zero (mm) at which each contact pair touches, for small displacements; None if never."""
         found: list[float | None] = []
@@ -174,8 +236,25 @@ class DrivenMechanism:
             found.append(float(touches[np.argmin(np.abs(touches))]) if touches.size else None)
         return found
 
-    def equilibrium(self, input_mm: float, *, large_rotation: bool, contact: bool) -> MechanismEquilibrium:
+    def equilibrium(
+        self,
+        input_mm: float,
+        *,
+        large_rotation: bool = False,
+        contact: bool = False,
+        between: tuple[float, float] = (0.0, 0.0),
+    ) -> MechanismEquilibrium:
         """Find the equilibrium at one input.
+
+        Parameters
+        ----------
+        input_mm : float
+            Input.
+        large_rotation, contact : bool
+            Whether the equilibrium is that of the deformed shape, and whether faces stop each other.
+        between : (float, float)
+            Thickness (mm) of a part that fills the gaps of the contacts, and its compliance (mm/N) at every gap; for
+            small displacements with contact.
 
         Raises
         ------
@@ -190,11 +269,11 @@ class DrivenMechanism:
             drives = self.drive_stiffness_n_mm @ self.per_input * input_mm
             return MechanismEquilibrium(moved, self.input_stiffness_n_mm * input_mm, drives, pressed)
         gap, slope, by_force = self._touching
-        apart, facing = gap + slope @ moved, np.isfinite(gap)
+        apart, facing = gap + slope @ moved - between[0], np.isfinite(gap)
         forces = np.zeros(gap.size)
         if np.any(apart[facing] < 0.0):
             compliance = (slope @ by_force)[np.ix_(facing, facing)]
-            forces[facing] = contact_forces_n(0.5 * (compliance + compliance.T), apart[facing])
+            forces[facing] = contact_forces_n(0.5 * (compliance + compliance.T) + between[1], apart[facing])
             moved = moved + by_force @ forces
         drives = self.by_drive.T @ (self.stiffness_n_mm @ moved - slope.T @ forces)
         return MechanismEquilibrium(moved, float(self.per_input @ drives), drives, self._by_pair(forces))
@@ -225,41 +304,70 @@ class DrivenMechanism:
 
     def _followed(self, input_mm: float, pairs: Pairs) -> MechanismEquilibrium:
         """Follow the equilibria from rest, in steps that grow after convergence and are halved after a failure."""
-        moved = np.zeros(self.by_input.size)
-        path = [(0.0, moved)]
-        touching = np.zeros(self._all_gaps(pairs, moved)[0].size, dtype=bool)
-        pressed = np.zeros(touching.size)
-        reached, step = 0.0, 1.0 / _LOAD_STEPS
-        while input_mm != 0.0 and reached < 1.0:
-            to = min(1.0, reached + step)
-            found = self._settled(self._predicted(path, to * input_mm), touching, pressed, to * input_mm, pairs)
+        known = self._known.setdefault((bool(pairs), input_mm > 0.0), [self._at_rest(pairs)])
+        path = [state for state in known if state.size_mm <= abs(input_mm)]
+        step_mm = abs(input_mm) / _LOAD_STEPS
+        while (last := path[-1]).size_mm < abs(input_mm):
+            to = min(abs(input_mm), last.size_mm + step_mm)
+            at = float(np.copysign(to, input_mm))
+            found = self._settled(self._predicted(path[-3:], at), last.touching, last.pressed, at, pairs)
             if found is not None:
-                moved, touching, pressed = found
-                path, reached, step = [*path[-2:], (to * input_mm, moved)], to, 1.5 * step
+                path.append(_Reached(to, *found))
+                insort(known, path[-1], key=lambda state: state.size_mm)
+                step_mm *= 1.5
                 continue
-            step *= 0.5
-            if step < _LEAST_STEP:
+            step_mm = 0.5 * (to - last.size_mm)
+            if step_mm < _LEAST_STEP * abs(input_mm):
                 raise ModelError(
                     f"The equilibrium of {self.name} could be computed up to an input of "
-                    f"{reached * input_mm:.4g} mm only, but {input_mm:g} mm are requested; take a smaller input."
+                    f"{np.copysign(last.size_mm, input_mm):.4g} mm only, but {input_mm:g} mm are requested; take a "
+                    "smaller input."
                 )
+        moved, pressed = path[-1].moved, path[-1].pressed
         loads = self.internal(moved) - self._all_gaps(pairs, moved)[1].T @ pressed
         drives = np.asarray(self.by_drive.T @ loads)
         by_pair = self._by_pair(pressed) if pairs else ()
         return MechanismEquilibrium(moved, float(self.per_input @ drives), drives, by_pair)
 
-    def _predicted(self, path: list[tuple[float, Array]], input_mm: float) -> Array:
+    @cached_property
+    def _known(self) -> dict[tuple[bool, bool], list["_Reached"]]:
+        """Equilibria in the deformed shape, from rest outwards, by contact and sign of the input."""
+        return {}
+
+    def _at_rest(self, pairs: Pairs) -> "_Reached":
+        moved = np.zeros(self.by_input.size)
+        nodes = self._all_gaps(pairs, moved)[0].size
+        return _Reached(0.0, moved, np.zeros(nodes, dtype=bool), np.zeros(nodes))
+
+    def first_touch(self, guess_mm: float) -> float:
+        """Input (mm) at which the first node meets what it faces, in the deformed shape, by Newton's method.
+
+        Raises
+        ------
+        ModelError
+            If no such input is found near the one for small displacements, `guess_mm`.
+        """
+        at_mm = guess_mm
+        for _ in range(_NEWTON_STEPS):
+            moved = self._followed(at_mm, ()).displacement
+            gap, slope, _ = self._all_gaps(self.gaps, moved)
+            place = int(np.argmin(gap))
+            if abs(gap[place]) < _TOUCHES * abs(guess_mm):
+                return at_mm
+            at_mm -= float(gap[place] / (slope[place] @ self.unit_displacement)[0])
+        raise ModelError(f"The input at which {self.name} first touches was not found near {guess_mm:g} mm.")
+
+    def _predicted(self, path: list["_Reached"], input_mm: float) -> Array:
         """Extrapolate the path; from rest, use the small displacements.
 
         Without extrapolation, slender leaf flexures would be stretched at the start of every step.
         """
         if len(path) == 1:
             return input_mm * self.unit_displacement
-        inputs = [at for at, _ in path]
-        moved = np.zeros_like(path[0][1])
-        for place, (at, displacement) in enumerate(path):
-            others = inputs[:place] + inputs[place + 1 :]
-            moved += np.prod([(input_mm - other) / (at - other) for other in others]) * displacement
+        size_mm, moved = abs(input_mm), np.zeros_like(path[0].moved)
+        for state in path:
+            others = [other.size_mm for other in path if other is not state]
+            moved += np.prod([(size_mm - at) / (state.size_mm - at) for at in others]) * state.moved
         return moved
 
     def _settled(

@@ -5,7 +5,7 @@ corrected by the hinge tables; the bodies that they join are cut from the drawin
 frames (`condensed_bodies`). Flexures and bodies may rotate by any angle.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
@@ -16,24 +16,26 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, identity
 
 from fingervision.domain.errors import ModelError
+from fingervision.domain.gripper import PointMm
 from fingervision.models.body_assembly import assemble_bodies
-from fingervision.models.contact_pairs import contact_pair
+from fingervision.models.condensed_bodies import OwnModes
+from fingervision.models.contact_pairs import ContactNodes, ContactPair, contact_pair
 from fingervision.models.corotational_body import turned_axes
 from fingervision.models.corotational_frame import CorotationalFrame
+from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStress
 from fingervision.models.flexure_span import FlexureSpan, span_of
-from fingervision.models.flexure_stress import nominal_stress_mpa
-from fingervision.models.frame_vibration import FrameVibration, SegmentMass, frame_vibration
+from fingervision.models.flexure_stress import nominal_stress
+from fingervision.models.frame_vibration import SegmentMass, frame_vibration
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.mechanism import Contact, Mechanism, check_mechanism
+from fingervision.models.mechanism import Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
-from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps, MechanismEquilibrium
+from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
 from fingervision.models.mechanism_faces import per_input_of
-from fingervision.models.mechanism_state import MechanismState, changes, observables, state_in_equilibrium
-from fingervision.models.modal_model import FreeModes, ModalModel
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.rigid_motion import BodyPose
 from fingervision.models.strip_energy import used_in_frame
-from fingervision.models.triangulate import triangulate
+from fingervision.models.triangulate import PlaneMesh, triangulate
 
 Array = NDArray[np.float64]
 
@@ -80,9 +82,11 @@ _FORCE_MISUSED, _STRESS_ERROR, _STRESS_MISUSED = 0.05, 0.02, 0.3
 across a notch are within 1 % of those in plane stress; forces along a notch are up to 4 % too low or too high (elliptic
 cuts, wide plates). The stress is too low by 0.3 sqrt(t / R), because its peak is no longer at the neck."""
 _TINIEST = 1e-300
+_LEAST_OWN = 3
+"""Own modes of every body with which its first mode is computed."""
 
 
-class MechanismFrame:
+class MechanismFrame(ElasticMechanism):
     """Lumped model of a mechanism: flexures as beams between condensed elastic bodies.
 
     Parameters
@@ -93,6 +97,8 @@ class MechanismFrame:
         Whether the restraint of the flexures by the plate's width is included; plane stress if False.
     theory : HingeTheory
         Theory of the notches' compliance.
+    mesh : PlaneMesh or None
+        Triangles of the bodies without the flexures; None makes them.
 
     Raises
     ------
@@ -103,9 +109,15 @@ class MechanismFrame:
     kind = "lumped"
 
     def __init__(
-        self, mechanism: Mechanism, *, width_effect: bool = True, theory: HingeTheory = HingeTheory.CORRECTED
+        self,
+        mechanism: Mechanism,
+        *,
+        width_effect: bool = True,
+        theory: HingeTheory = HingeTheory.CORRECTED,
+        mesh: PlaneMesh | None = None,
     ) -> None:
-        self.mechanism, self.theory, self._width_effect = mechanism, theory, width_effect
+        super().__init__(mechanism)
+        self.theory, self._width_effect = theory, width_effect
         region = mechanism.region
         check_mechanism(mechanism, region)
         if not mechanism.flexures:
@@ -114,8 +126,8 @@ class MechanismFrame:
             )
         self.spans = tuple(span_of(flexure, region) for flexure in mechanism.flexures)
         cut = PlanarRegion((*region.steps, *((False, span.slab) for span in self.spans)), region.marks_mm)
-        mesh = triangulate(cut, _ACROSS, _BODY * region.size_mm)
-        self._mesh, self._size_mm = mesh, region.size_mm
+        self._mesh = mesh or triangulate(cut, _ACROSS, _BODY * region.size_mm)
+        self._size_mm = region.size_mm
         self._assemble()
         if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures):
             # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
@@ -135,7 +147,8 @@ class MechanismFrame:
         mechanism = self.mechanism
         zones = tuple(f.zone(mechanism.plate_mm) for f in mechanism.flexures if not f.is_notch)
         used = zones if self._width_effect else ()
-        self.plate = PlaneStressPlate(self._mesh, mechanism.material, mechanism.plate_mm, used)
+        thick_mm = mechanism.halves * mechanism.plate_mm
+        self.plate = PlaneStressPlate(self._mesh, mechanism.material, thick_mm, used)
         self.assembly = assemble_bodies(self.plate, mechanism, self.spans, self._size_mm)
         self._make_flexures()
 
@@ -146,7 +159,7 @@ class MechanismFrame:
         compliances: list[Array] = []
         self.segments: list[range] = []
         self._masses: list[SegmentMass] = []
-        self._vibrating: tuple[int, FrameVibration] | None = None
+        self._vibrating: dict[int, tuple[tuple[OwnModes, ...], DrivenMechanism]] = {}
         for span, (first, last) in zip(self.spans, assembly.ends, strict=True):
             stations = span.stations_mm(mechanism.plate_mm)
             nodes = [first, *range(len(places), len(places) + len(stations) - 2), last]
@@ -154,9 +167,9 @@ class MechanismFrame:
             self.segments.append(range(len(ends), len(ends) + len(stations) - 1))
             own = list(pairwise(nodes))
             ends += own
-            compliances += list(span.compliances(mechanism.plate_mm, mechanism.material, self.theory,
-                                                 width_effect=self._width_effect))  # fmt: skip
-            weight = mechanism.material.density_t_mm3 * mechanism.plate_mm
+            one = span.compliances(mechanism.plate_mm, mechanism.material, self.theory, width_effect=self._width_effect)
+            compliances += list(one / mechanism.halves)
+            weight = mechanism.material.density_t_mm3 * self.plate.plate_mm
             lengths = np.diff(stations)
             masses = weight * lengths * span.flexure.height_mm(0.5 * (stations[1:] + stations[:-1]))
             self._masses += list(map(SegmentMass, own, masses.tolist(), lengths.tolist()))
@@ -199,39 +212,40 @@ class MechanismFrame:
         every = identity(self.frame.unknowns, format="csc")
         return DrivenMechanism(
             self.mechanism.name, self._tangent, lambda moved: self._tangent(moved)[1], csr_matrix(every[:, self.free]),
-            self.by_drive, per_input_of(self.mechanism), tuple(map(self._gaps_of, self.mechanism.contacts)),
+            self.by_drive, per_input_of(self.mechanism), self._no_mass,
+            tuple(self._gaps_of(*ends) for ends in self._contact_ends),
         )  # fmt: skip
 
-    def _gaps_of(self, contact: Contact) -> Callable[[Array], Gaps]:
-        """Return a function that gives the gaps of a contact at the two nodes of its face that are farthest apart."""
-        plate = self.plate
-        pair = contact_pair(plate, contact, self.mechanism, self._size_mm)
-        places = plate.nodes_mm[:, pair.nodes]
-        apart = places - places[:, :1]
-        first = int(np.argmax(np.hypot(*apart)))
-        second = int(np.argmax(np.hypot(*(places - places[:, [first]]))))
-        ends = replace(pair, nodes=pair.nodes[[first, second]])
+    def _no_mass(self) -> csr_matrix:
+        raise NotImplementedError("The frames' masses need the bodies' own modes: see `vibrating`.")
+
+    @cached_property
+    def _contact_ends(self) -> tuple[tuple[ContactNodes, ContactPair], ...]:
+        """The nodes of every contact; of its first face, the two that are farthest apart."""
+        found = []
+        for contact in self.mechanism.contacts:
+            pair = contact_pair(self.plate, contact, self.mechanism, self._size_mm)
+            places = self.plate.nodes_mm[:, pair.nodes]
+            first = int(np.argmax(np.hypot(*(places - places[:, :1]))))
+            second = int(np.argmax(np.hypot(*(places - places[:, [first]]))))
+            found.append(replace(pair, nodes=pair.nodes[[first, second]]).alone(self.plate))
+        return tuple(found)
+
+    @property
+    def contact_points_mm(self) -> tuple[Array, ...]:
+        """The two nodes of every contact's face that are farthest apart, shape (2, 2) each."""
+        return tuple(nodes.nodes_mm[:, pair.nodes] for nodes, pair in self._contact_ends)
+
+    def _gaps_of(self, nodes: ContactNodes, pair: ContactPair) -> Callable[[Array], Gaps]:
+        """Return a function that gives the gaps of a contact at the two ends of its face."""
 
         def gaps(moved: Array) -> Gaps:
-            field, slope = self.assembly.field(moved)
-            gap, by_node, bend = ends.gaps_mm(plate, field)
+            field, slope = self.assembly.field(moved, nodes.places)
+            gap, by_node, bend = pair.gaps_mm(nodes, field)
             # The second derivative leaves out the rotation of the frames, which makes Newton's method a little slower.
             return gap, csr_matrix(by_node @ slope), lambda forces: csr_matrix(slope.T @ bend(forces) @ slope)
 
         return gaps
-
-    @property
-    def stiffness_n_mm(self) -> float:
-        """Force at the drive per 1 mm of input, at rest (N/mm)."""
-        return self.driven.input_stiffness_n_mm
-
-    def touch_input_mm(self) -> dict[str, float]:
-        """Input nearest to zero at which each contact first touches, in small displacements.
-
-        Contacts that never touch are left out.
-        """
-        names = [contact.name for contact in self.mechanism.contacts]
-        return {n: at for n, at in zip(names, self.driven.touch_inputs_mm(), strict=True) if at is not None}
 
     @cached_property
     def _errors(self) -> tuple[float, float]:
@@ -266,49 +280,59 @@ class MechanismFrame:
         share = 1.0 if large else _TINY * self._size_mm / max(float(np.abs(moved).max()), _TINY)
         return np.asarray(self.frame.end_loads(share * moved) / share)
 
-    def state(self, input_mm: float, *, large_rotation: bool = False, contact: bool = False) -> MechanismState:
-        """Find the equilibrium at one input."""
-        found = self.driven.equilibrium(input_mm, large_rotation=large_rotation, contact=contact)
-        return self._seen(input_mm, found, large_rotation=large_rotation)
+    @cached_property
+    def swaying(self) -> "MechanismFrame":
+        """The half of a mirrored drawing whose other half moves the same way sideways."""
+        return MechanismFrame(
+            self.mechanism.swaying, width_effect=self._width_effect, theory=self.theory, mesh=self._mesh
+        )
 
-    def drive_states(self) -> tuple[MechanismState, ...]:
-        """Small displacements per 1 mm of one driven face after another, with all other driven faces at rest."""
-        return tuple(self._seen(1.0, found, large_rotation=False) for found in self.driven.by_one_drive())
+    def peak_stress(self, moved: Array, *, large: bool = False) -> LargestStress:
+        """Largest nominal stress in the flexures, with the factors of a notch or of fillets."""
+        loads, mechanism = self._end_loads(moved, large=large) / self.mechanism.halves, self.mechanism
+        found = (
+            nominal_stress(span, loads[list(own)], mechanism, self.theory, width_effect=self._width_effect)
+            for span, own in zip(self.spans, self.segments, strict=True)
+        )
+        return max(found, key=lambda peak: peak.mpa)
 
-    def _seen(self, input_mm: float, found: MechanismEquilibrium, *, large_rotation: bool) -> MechanismState:
-        mechanism, moved = self.mechanism, found.displacement
-        probes = {name: self._motion(moved, point, large=large_rotation) for name, point in mechanism.probes.items()}
-        loads = self._end_loads(moved, large=large_rotation)
-        stress = max(nominal_stress_mpa(span, loads[list(own)], mechanism, self.theory,
-                                        width_effect=self._width_effect)
-                     for span, own in zip(self.spans, self.segments, strict=True))  # fmt: skip
-        poses = plate_poses(self.plate, self.bodies, self._field(moved, large=large_rotation), large=large_rotation)
-        return state_in_equilibrium(mechanism, input_mm, found, probes, stress, poses, large=large_rotation)
+    def drawn_poses(self, moved: Array, *, large: bool) -> Mapping[str, BodyPose]:
+        """Poses of the drawn bodies."""
+        return plate_poses(self.plate, self.bodies, self._field(moved, large=large), large=large)
+
+    def pulled(self, direction: PointMm, system: DrivenMechanism) -> Array:
+        """Displacements of a rigid translation: every frame moves, no body vibrates."""
+        moved = np.zeros(system.unknowns)
+        moved[0 : self.frame.unknowns : 3], moved[1 : self.frame.unknowns : 3] = direction
+        return moved
 
     @cached_property
     def bodies(self) -> tuple[LinkBody, ...]:
         """The bodies that the flexures join."""
-        return bodies_of(self.mechanism, self.spans)
+        return bodies_of(self.mechanism)
 
     def _field(self, moved: Array, *, large: bool) -> Array:
-        """Displacement of every node of the bodies."""
+        """Displacement of every node of the bodies; small displacements may include the bodies' own modes."""
         if large:
-            return self.assembly.field(moved)[0]
-        return np.asarray(sum((body.shapes_mm @ moved[body.unknowns] for body in self.assembly.bodies),
-                              np.zeros(self.plate.unknowns)))  # fmt: skip
+            return self.assembly.field(moved, np.arange(self.plate.x_dofs.size))[0]
+        return self.assembly.small_field(moved, self._own_of(moved))
 
-    def _motion(self, moved: Array, point: tuple[float, float], *, large: bool) -> tuple[float, float]:
+    def _own_of(self, moved: Array) -> tuple[OwnModes, ...]:
+        """Own modes of the bodies whose coordinates follow the frames' motions, if there are such coordinates."""
+        return next(iter(self._vibrating.values()))[0] if moved.shape[0] > self.frame.unknowns else ()
+
+    def motion_mm(self, moved: Array, point: PointMm, *, large: bool) -> Array:
         """Displacement of a point of a body; a point on a flexure moves with the nearest section of it."""
         node = self._section_at(point)
         if node is None:
-            return self.assembly.motion_mm(moved, point, large=large)
-        x, y, angle = moved[3 * node : 3 * node + 3]
+            return self.assembly.motion_mm(moved, point, self._own_of(moved), large=large)
+        x, y, angle = (moved[3 * node + way] for way in range(3))
         arm = np.array(point) - self.frame.nodes_mm[node]
-        turn = turned_axes(angle) - np.eye(2) if large else angle * np.array([[0.0, -1.0], [1.0, 0.0]])
-        way = np.array([x, y]) + turn @ arm
-        return float(way[0]), float(way[1])
+        if large:
+            return np.array([x, y]) + (turned_axes(float(angle)) - np.eye(2)) @ arm
+        return np.stack([x - angle * arm[1], y + angle * arm[0]])
 
-    def _section_at(self, point: tuple[float, float]) -> int | None:
+    def _section_at(self, point: PointMm) -> int | None:
         """Node of the section of a flexure that is nearest to a point on the flexure; None for a point on a body."""
         for span, own in zip(self.spans, self.segments, strict=True):
             if span.slab.holds(np.array(point)[:, None])[0]:
@@ -316,62 +340,20 @@ class MechanismFrame:
                 return int(nodes[np.argmin(np.hypot(*(self.frame.nodes_mm[nodes] - point).T))])
         return None
 
-    def _vibration(self, count: int) -> FrameVibration:
-        """Mass and stiffness with `count` own modes of every body; the result for the latest count is cached."""
-        if self._vibrating is None or self._vibrating[0] != count:
-            stiffness = self.driven.stiffness_n_mm.toarray()
-            found = frame_vibration(self.assembly, stiffness, self._masses, self.free, self.by_input, count)
-            self._vibrating = count, found
-        return self._vibrating[1]
+    def vibrating(self, count: int) -> DrivenMechanism:
+        """Return the system with masses and as many own modes of every body; without own modes for a count of 0."""
+        own = max(count, _LEAST_OWN) if count else 0
+        if own not in self._vibrating:  # the latest number is kept
+            self._vibrating = {own: frame_vibration(self.assembly, self.driven, self._masses, own)}
+        return self._vibrating[own][1]
 
-    def modes_hz(self, *, drive_held: bool, count: int = 3) -> tuple[float, ...]:
-        """First natural frequencies in the plane, with the drive fixed or free to move along its direction (Hz)."""
-        rad_s, _, _ = self._vibration(count).modes(drive_held=drive_held, count=count)
-        return tuple((rad_s / (2.0 * np.pi)).tolist())
-
-    def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
-        """First natural modes in the plane: angular frequencies in rad/s, and mode shapes of unit mass by column.
-
-        A mode shape contains the displacements of the bodies' nodes, followed by the motions of the coordinate frames.
-        """
-        vibration = self._vibration(count)
-        rad_s, shapes, _ = vibration.modes(drive_held=drive_held, count=count)
-        return rad_s, np.vstack([vibration.field(shapes), shapes[: vibration.frames]])
+    def line_motions(self, shapes: Array) -> Array:
+        """Displacements of the bodies' nodes, followed by the motions of the coordinate frames."""
+        return np.vstack([self._field(shapes, large=False), shapes[: self.frame.unknowns]])
 
     def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
-        """Lines of the bodies' outlines and of the flexures' axes; see `mode_shapes.MovingMechanism`."""
+        """Lines of the bodies' outlines and of the flexures' axes, and their places in `line_motions`."""
         lines, places = self.plate.outline_lines()
         ends = self.frame.ends
         own = self.plate.unknowns + 3 * ends[:, :, None] + np.arange(2)
         return np.concatenate([lines, self.frame.nodes_mm[ends]]), np.concatenate([places, own])
-
-    def modal_model(self, count: int) -> ModalModel:
-        """Reduce the mechanism to its static shape and its modes with the drive fixed; see `MechanismPlate`."""
-        vibration = self._vibration(count)
-        rad_s, shapes, _ = vibration.modes(drive_held=True, count=count)
-        static = np.append(self.driven.unit_displacement, np.zeros(shapes.shape[0] - vibration.frames))
-        inertia = vibration.mass_t @ static
-        return ModalModel(
-            stiffness_n_mm=self.stiffness_n_mm,
-            mass_t=float(static @ inertia),
-            rad_s=rad_s,
-            participation=shapes.T @ inertia,
-            observed=observables(self.mechanism, self._probes_by(vibration, np.column_stack([static, shapes]))),
-        )
-
-    def free_modes(self, count: int) -> FreeModes:
-        """Return the modes with the drive free along its direction."""
-        vibration = self._vibration(count)
-        rad_s, shapes, drive = vibration.modes(drive_held=False, count=count)
-        return FreeModes(rad_s, drive, changes(self.mechanism, self._probes_by(vibration, shapes)))
-
-    def _probes_by(self, vibration: FrameVibration, shapes: Array) -> dict[str, Array]:
-        """Small motion of every probe caused by each column of displacements, shape (2, k)."""
-        fields, found = vibration.field(shapes), {}
-        for name, point in self.mechanism.probes.items():
-            if self._section_at(point) is None:
-                found[name] = self.plate.rows_at(point) @ fields
-            else:
-                by_column = (self._motion(column, point, large=False) for column in shapes[: vibration.frames].T)
-                found[name] = np.array(list(by_column)).T
-        return found

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import ModelError
 from fingervision.models.grip import Part
 from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.models.steady_loads import STANDARD_GRAVITY_MM_S2
 
 Array = NDArray[np.float64]
 
@@ -40,28 +39,37 @@ def operating_figures_of(model: MechanismPlate) -> dict[str, float]:
     for name in model.pair_rows:
         if (pressed := GrippedPair(model, name)).per_input:
             figures[f"{name}: mechanical advantage [N/N]"] = pressed.mechanical_advantage
-    plate = model.plate
-    for way, pulled_dofs, sign in (("-y", plate.y_dofs, -1.0), ("x", plate.x_dofs, 1.0)):
-        pulled = np.zeros(plate.unknowns)
-        pulled[pulled_dofs] = sign * STANDARD_GRAVITY_MM_S2
-        hung = model.driven.under_load(plate.mass_t @ pulled)
+    for way, direction in (("-y", (0.0, -1.0)), ("x", (1.0, 0.0))):
+        hung = model.under_weight(direction)
         for name, row in model.pair_rows.items():
             figures[f"{name}: by its weight along {way} [mm]"] = float(row @ hung)
         for name, rows in model.probe_rows.items():
             figures[f"{name}: moved by its weight along {way} [mm]"] = float(np.hypot(*(rows @ hung)))
-    expansion = plate.material.thermal_expansion_per_k
-    if expansion is not None:
-        free = np.zeros(plate.unknowns)
-        free[plate.x_dofs], free[plate.y_dofs] = expansion * plate.nodes_mm
-        stiffness = model.driven.stiffness_n_mm
-        grown = model.driven.under_load(stiffness @ free)
-        figures["force_per_kelvin_n"] = float(model.driven.by_input @ (stiffness @ (grown - free)))
+    if (warmed := per_kelvin(model)) is not None:
+        grown, figures["force_per_kelvin_n"] = warmed
         for name, row in model.pair_rows.items():
             figures[f"{name}: per kelvin [mm/K]"] = float(row @ grown)
         for name, rows in model.probe_rows.items():
             for axis, row in zip("xy", rows, strict=True):
                 figures[f"{name}: {axis} per kelvin [mm/K]"] = float(row @ grown)
     return figures
+
+
+def per_kelvin(model: MechanismPlate) -> tuple[Array, float] | None:
+    """Displacements (mm) and force at the held drive (N) per kelvin; None if the material states no expansion.
+
+    A free body expands without stress, each node by the strain times its position x. The displacements u therefore
+    satisfy K (u - strain x) = 0 at every unknown that is not fixed, with K the stiffness matrix.
+    """
+    plate, system = model.plate, model.driven
+    expansion = plate.material.thermal_expansion_per_k
+    if expansion is None:
+        return None
+    free = np.zeros(plate.unknowns)
+    free[plate.x_dofs], free[plate.y_dofs] = expansion * plate.nodes_mm
+    stiffness = system.stiffness_n_mm
+    grown = system.under_load(stiffness @ free)
+    return grown, float(system.by_input @ (stiffness @ (grown - free)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,4 +149,4 @@ class GrippedPair:
         grip = pressed_mm / (self.compliance_mm_n + 1.0 / part.stiffness_n_mm)
         moved = input_mm * model.unit_displacement_mm + grip * self._pushed
         force = model.stiffness_n_mm * input_mm - grip * self.per_input
-        return PairGrip(input_mm, free_mm + grip * self.compliance_mm_n, grip, force, model.stress_mpa(moved))
+        return PairGrip(input_mm, free_mm + grip * self.compliance_mm_n, grip, force, model.peak_stress(moved).mpa)

@@ -17,19 +17,17 @@ drive vibrate instead; with d_r the motion of the drive in mode r:
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import pi, sqrt
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.models.damping import Damping
-from fingervision.models.driven_body import DrivenBody
 
 Array = NDArray[np.float64]
 
 GAP = "gap_mm"
-_HALVES = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,36 +121,3 @@ def described(damping: Damping, rad_s: Array) -> Array:
         except FingervisionError:
             continue
     return damping.ratios(rad_s[:1])
-
-
-def gripper_modes(body: DrivenBody, count: int) -> ModalModel:
-    """Reduce a gripper to its modes, with both halves moving as mirror images.
-
-    Parameters
-    ----------
-    body : DrivenBody
-        The right half.
-    count : int
-        Number of modes with the drive held.
-    """
-    rad_s, shapes = body.modes(drive_held=True, count=count)
-    static = body.unit_displacement_mm
-    inertia = body.mass_t @ static
-    slope = body.measured_mm(static) - body.measured_rest_mm
-    gap = Observable(
-        _HALVES * body.measured_rest_mm, _HALVES * slope, sqrt(_HALVES) * (body.weights @ shapes[body.measured])
-    )
-    return ModalModel(
-        stiffness_n_mm=_HALVES * float(static @ (body.stiffness_n_mm @ static)),
-        mass_t=_HALVES * float(static @ inertia),
-        rad_s=rad_s,
-        participation=sqrt(_HALVES) * (shapes.T @ inertia),
-        observed={GAP: gap},
-    )
-
-
-def gripper_free_modes(body: DrivenBody, count: int) -> FreeModes:
-    """Modes of a gripper with its drive free, with both halves moving as mirror images."""
-    rad_s, shapes = body.modes(drive_held=False, count=count)
-    drive = shapes[body.driven[0]] / sqrt(_HALVES)
-    return FreeModes(rad_s, drive, {GAP: sqrt(_HALVES) * (body.weights @ shapes[body.measured])})

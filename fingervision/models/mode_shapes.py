@@ -3,14 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, pi
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import UsageError
-from fingervision.models.driven_body import DrivenBody
-from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.elastic_mechanism import ElasticMechanism
 
 Array = NDArray[np.float64]
 Solve = Callable[[int], tuple[Array, Array]]
@@ -19,6 +17,8 @@ MOST_MODES = 40
 _SHOWN = 0.08
 """Largest displacement in a plotted mode shape, as a share of the body's height."""
 _FIRST = 4
+_ON_AXIS = 1e-9
+"""Distance from the symmetry axis, as a share of the size, at which a line counts as lying on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,18 +57,6 @@ class ModeShape:
     swing: float = 1.0
 
 
-class MovingMechanism(Protocol):
-    """Protocol of a mechanism, described by its bodies, whose vibration can be computed because it has masses."""
-
-    def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array]:
-        """First natural modes in the plane: angular frequencies (rad/s), and mode shapes by column."""
-        ...
-
-    def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
-        """Line pieces to plot, shape (n, 2, 2), and the indices of their ends' motions (x and y) in a mode shape."""
-        ...
-
-
 def parse_modes(text: str) -> ModesWanted:
     """Parse the number of modes, such as `6`, or the frequency up to which they are computed, such as `500Hz`.
 
@@ -93,53 +81,45 @@ def parse_modes(text: str) -> ModesWanted:
     )
 
 
-def gripper_mode_shapes(model: Any, wanted: ModesWanted) -> list[ModeShape]:
-    """Modes of a gripper: symmetric with the drive free or fixed, and antisymmetric (both halves sway the same way).
+def mode_shapes(model: ElasticMechanism, wanted: ModesWanted) -> list[ModeShape]:
+    """Modes of a mechanism with the drive free or fixed.
+
+    Those of a mirrored drawing are symmetric; with its drive free to move across, both halves also sway the same way
+    (antisymmetric modes).
 
     Parameters
     ----------
-    model : LumpedGripper or FiniteElementGripper
-        The gripper.
+    model : ElasticMechanism
+        The mechanism.
     wanted : ModesWanted
         Number of modes of each family, or highest frequency.
     """
-    half: DrivenBody = model.half
-    lines, points = _lines_of_half(model)
-    # Leave out lines on the symmetry axis, which is not an edge of the whole body.
-    real = np.abs(lines[..., 0]).max(axis=1) > 1e-9 * float(np.abs(lines).max())
-    lines, points = lines[real], points[real]
-    families: tuple[tuple[str, Solve, float], ...] = (
-        ("drive free", lambda count: half.modes(drive_held=False, count=count), 1.0),
-        ("drive held", lambda count: half.modes(drive_held=True, count=count), 1.0),
-        ("swaying drive free across", lambda count: half.swaying_modes(count=count), -1.0),
-    )
+    families = [("drive free", model, False, 1.0), ("drive held", model, True, 1.0)]
+    mirrored = model.mechanism.mirrored
+    if mirrored:
+        families.append(("swaying drive free across", model.swaying, True, -1.0))
     found = []
-    for family, solve, mirror in families:
-        rad_s, shapes = _wanted_modes(solve, wanted, half.free.size)
-        for number, (angular, shape) in enumerate(zip(rad_s, shapes.T, strict=True), 1):
-            shift = _scaled(lines, shape[points], mirrored=mirror > 0.0)
-            # The left half mirrors the right half; for swaying modes, the motion of the left half has the opposite
-            # sign.
-            flip = np.array([-1.0, 1.0])
-            both = np.concatenate([lines, flip * lines]), np.concatenate([shift, mirror * flip * shift])
-            swing = min(1.0, _way_to_meeting(lines[..., 0], -shift[..., 0])) if mirror > 0.0 else 1.0
-            found.append(ModeShape(family, number, float(angular / (2.0 * pi)), *both, swing))
-    return found
-
-
-def mechanism_mode_shapes(model: MovingMechanism, wanted: ModesWanted) -> list[ModeShape]:
-    """Modes of a mechanism that is described by its bodies, with the drive free or fixed."""
-    lines, points = model.mode_lines()
-    found = []
-    for family, held in (("drive free", False), ("drive held", True)):
+    for family, moving, held, mirror in families:
+        lines, points = moving.mode_lines()
+        # Leave out lines on the symmetry axis, which is not an edge of the whole body.
+        real = np.abs(lines[..., 0]).max(axis=1) > (_ON_AXIS * float(np.abs(lines).max()) if mirrored else -1.0)
+        lines, points = lines[real], points[real]
         rad_s, shapes = _wanted_modes(
-            lambda count, held=held: model.modes(drive_held=held, count=count),  # type: ignore[misc]
+            lambda count, moving=moving, held=held: moving.modes(drive_held=held, count=count),  # type: ignore[misc]
             wanted,
             2 * MOST_MODES,
         )
         for number, (angular, shape) in enumerate(zip(rad_s, shapes.T, strict=True), 1):
-            shift = _scaled(lines, shape[points], mirrored=False)
-            found.append(ModeShape(family, number, float(angular / (2.0 * pi)), lines, shift))
+            symmetric = mirrored and mirror > 0.0
+            shift = _scaled(lines, shape[points], mirrored=symmetric)
+            both, swing = (lines, shift), 1.0
+            if mirrored:
+                # The left half mirrors the right half; for swaying modes, its motion has the opposite sign.
+                flip = np.array([-1.0, 1.0])
+                both = np.concatenate([lines, flip * lines]), np.concatenate([shift, mirror * flip * shift])
+            if symmetric:
+                swing = min(1.0, _way_to_meeting(lines[..., 0], -shift[..., 0]))
+            found.append(ModeShape(family, number, float(angular / (2.0 * pi)), *both, swing))
     return found
 
 
@@ -160,15 +140,6 @@ def _wanted_modes(solve: Solve, wanted: ModesWanted, unknowns: int) -> tuple[Arr
         count = min(2 * count, MOST_MODES, unknowns - 2)
 
 
-def _lines_of_half(model: Any) -> tuple[Array, NDArray[np.int64]]:
-    """Line pieces to plot, shape (n, 2, 2), and the indices of the unknowns (x, y) of their ends."""
-    if hasattr(model, "plate"):
-        plate: PlaneStressPlate = model.plate
-        return plate.outline_lines()
-    frame = model.frame
-    return frame.nodes_mm[frame.ends], 3 * frame.ends[:, :, None] + np.arange(2)
-
-
 def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
     """Scale a mode shape for plotting; symmetric modes start by opening, and their halves must not intersect."""
     scale = _SHOWN * float(np.ptp(lines[..., 1])) / float(np.hypot(shape[..., 0], shape[..., 1]).max())
@@ -181,5 +152,5 @@ def _scaled(lines: Array, shape: Array, *, mirrored: bool) -> Array:
 
 def _way_to_meeting(x: Array, across: Array) -> float:
     """Largest scale factor of a mode shape at which no point of the half crosses the symmetry axis."""
-    closing = (across < 0.0) & (x > 1e-9 * float(x.max()))
+    closing = (across < 0.0) & (x > _ON_AXIS * float(x.max()))
     return float(np.min(-x[closing] / across[closing], initial=np.inf))

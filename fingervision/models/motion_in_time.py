@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +10,10 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError
 from fingervision.domain.response import Response
 from fingervision.models.damping import Damping, ModalDamping
-from fingervision.models.driven_body import DrivenBody
-from fingervision.models.modal_model import GAP, gripper_modes
+from fingervision.models.gripper_model import DrawnGripper
+from fingervision.models.modal_model import GAP
 from fingervision.models.modal_response import Motion, modal_motion, run_rows
-from fingervision.models.physics import Physics
-from fingervision.models.static_answer import contact_onset_mm
-from fingervision.models.stepped_response import step_for, stepped_motion
+from fingervision.models.stepped_response import ReducedMotion
 
 Array = NDArray[np.float64]
 
@@ -29,17 +26,6 @@ and only frames of bars have so few unknowns."""
 _FAST = 0.05
 """Largest vibration that still counts as small beside the motion that deforms the shape, as a share of the gap's
 travel."""
-
-
-class VibratingModel(Protocol):
-    """A model with masses, whose vibration can be computed."""
-
-    physics: Physics
-    half: DrivenBody
-
-    def respond(self, input_mm: Array) -> Response:
-        """Compute the static response."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +55,7 @@ class GripperMotion:
 
 
 def gripper_motion(
-    model: VibratingModel, drive: DriveHistory, damping: Damping | None = None, *, modes: int = MODES
+    model: DrawnGripper, drive: DriveHistory, damping: Damping | None = None, *, modes: int = MODES
 ) -> GripperMotion:
     """Compute the motion over a drive history; each run begins at rest at its first input.
 
@@ -80,7 +66,7 @@ def gripper_motion(
 
     Parameters
     ----------
-    model : LumpedGripper or FiniteElementGripper
+    model : DrawnGripper
         Model of the gripper, with its physics.
     drive : DriveHistory
         Inputs over time, linear between samples.
@@ -95,19 +81,20 @@ def gripper_motion(
         If large rotation or contact occurs together with vibrations that neither method can compute.
     """
     law = damping or ModalDamping()
-    small = modal_motion(gripper_modes(model.half, modes), drive, law)
+    small = modal_motion(model.modal_model(modes), drive, law)
     if not model.physics.large_rotation and not model.physics.contact:
         return GripperMotion(small, f"{small.modes_hz.size} modes, exact between the drive's samples")
     answer = model.respond(drive.input_mm)
     force = np.zeros_like(answer.gap_mm) if answer.force_n is None else answer.force_n
     static = {GAP: answer.gap_mm}
     spans_s = [float(np.ptp(drive.time_s[rows])) for rows in run_rows(drive)]
-    step_s = step_for(model.half)
-    if model.half.unknowns <= _MOST_UNKNOWNS and sum(spans_s) / step_s <= _MOST_STEPS:
+    body = ReducedMotion(model)
+    step_s = body.step_s
+    if body.unknowns <= _MOST_UNKNOWNS and sum(spans_s) / step_s <= _MOST_STEPS:
         gap = np.zeros_like(answer.gap_mm)
         for rows in run_rows(drive):
             run = DriveHistory(drive.time_s[rows], drive.input_mm[rows])
-            gap[rows], force[rows] = stepped_motion(model.half, run, model.physics, law, step_s)
+            gap[rows], force[rows] = body.over(run, law, step_s)
         return GripperMotion(
             replace(small, observed_mm={GAP: gap}, static_mm=static, force_n=force),
             f"generalised-alpha steps of {1e3 * step_s:.3g} ms",
@@ -120,7 +107,7 @@ def gripper_motion(
             f"but the drive takes {sum(spans_s):.3g} s and the gap vibrates by {small.vibration_mm(GAP):.3g} mm; "
             "shorten the drive, slow it down or leave --large-rotation and --contact off."
         )
-    onset_mm = contact_onset_mm(model.half, model.physics) if model.physics.contact else None
+    onset_mm = model.contact_onset_mm if model.physics.contact else None
     apart = np.ones_like(force, dtype=bool) if onset_mm is None else drive.input_mm > onset_mm
     motion = about_equilibria(small, static, force, apart)
     return GripperMotion(

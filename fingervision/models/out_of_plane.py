@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.models.deep_plate import DeepPlate
+from fingervision.models.elastic_mechanism import STANDARD_GRAVITY_MM_S2
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_faces import supports_of
 from fingervision.models.plane_stress import PlaneStressPlate
-from fingervision.models.steady_loads import STANDARD_GRAVITY_MM_S2
 from fingervision.models.triangulate import PlaneMesh, triangulate
 
 Array = NDArray[np.float64]
@@ -78,5 +78,8 @@ def out_of_plane(
     held += [plate.coefficients(nodes, way) for nodes in supports.driven for way in range(3)]
     body = plate.supported(np.concatenate(held))
     moved = body.sag(STANDARD_GRAVITY_MM_S2)
-    sag_mm = {name: plate.middle_mm(moved, point) for name, point in mechanism.probes.items()}
+    sag_mm = {
+        name: plate.middle_mm(moved, (abs(x) if mechanism.mirrored else x, y))
+        for name, (x, y) in mechanism.probes.items()
+    }
     return OutOfPlane(body.modes_hz(count), sag_mm)

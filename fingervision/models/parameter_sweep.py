@@ -21,7 +21,6 @@ from fingervision.models.mechanism_figures import mechanism_figures
 from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.redrawn import redrawn
-from fingervision.models.static_answer import gap_per_input
 
 Array = NDArray[np.float64]
 
@@ -223,10 +222,10 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
 
 def _figures(model: LumpedGripper) -> dict[str, float]:
     """Results for one drawing, by the names in `COLUMNS`."""
-    stress, touch = model.peak_stress().mpa_per_mm, model.half.first_touch_mm()
+    stress, touch = model.peak_stress().mpa_per_mm, model.first_touch_mm
     at_yield = model.gripper.material.yield_mpa / stress
     mode = model.modes_hz(drive_held=False, count=1)[0]
-    row = (gap_per_input(model.half), model.half.equilibrium(1.0).force_n, stress, at_yield,
+    row = (model.gap_per_input, model.force_per_input_n_mm, stress, at_yield,
            -np.inf if touch is None else touch, mode)  # fmt: skip
     return dict(zip(COLUMNS, row, strict=True))
 

@@ -17,16 +17,15 @@ from fingervision.domain.model import Model, PhysicalLaw
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.response import Response
 from fingervision.models.drawn_answer import DrawnAnswer
-from fingervision.models.driven_body import DrivenBody
 from fingervision.models.gripper_mechanism import whole_mechanism
-from fingervision.models.half_frame import half_frame
+from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model
 from fingervision.models.laws import laws_of
+from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physics import LINEAR
 from fingervision.models.place_answers import PlaceAnswers
 from fingervision.models.redrawn import redrawn
-from fingervision.models.skeleton import skeleton_of
 from fingervision.models.small_answer import SmallAnswer, ratio_curves, small_answer
 
 Array = NDArray[np.float64]
@@ -66,11 +65,10 @@ class PhysicalGripper:
     @cached_property
     def laws(self) -> Mapping[str, PhysicalLaw]:
         """Formulas for those effects of the catalogue that the drawing determines, by the name of the effect."""
-        body = getattr(self._model, "half", None)
-        if not isinstance(
-            body, DrivenBody
-        ):  # for a model limited to small displacements, take a frame of the same members
-            body = half_frame(self.gripper, skeleton_of(self.gripper, self.theory, 0))
+        model = self._model
+        if not isinstance(model, DrawnGripper):
+            # For a model limited to small displacements, take a frame of the same members.
+            model = LumpedGripper(self.gripper, theory=self.theory, bars_alone=True, segments=0)
         length_mm = self.gripper.lever.l2_mm
         lever = ratio_curves(
             self.gripper,
@@ -78,7 +76,7 @@ class PhysicalGripper:
             lambda by: redrawn(self.gripper, "lever.l2_mm", by),
             *sorted((_SHORTER * length_mm, _LONGER * length_mm)),
         )
-        return laws_of(DrawnAnswer(self.gripper, self.theory, body, self.input_range_mm, lever))
+        return laws_of(DrawnAnswer(self.gripper, self.theory, model, self.input_range_mm, lever))
 
     @cached_property
     def places(self) -> PlaceAnswers:

@@ -27,8 +27,6 @@ PARTS = ("x_mm", "y_mm", "angle_mrad")
 _SIMPSON = (1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0)
 """Simpson weights of an edge's two ends and its middle: exact for quadratic functions along the edge, as displacements
 are."""
-_UNIT = 1e-3
-"""Unit motion, in mm and rad, by which the coefficients of a linear functional are computed; its size is arbitrary."""
 _THINNEST, _THICKEST = 0.3, 2.5
 """Range of a flexure's thickness relative to the drawn one: its bending stiffness is then between 0.03 and 15 times the
 drawn one."""
@@ -131,10 +129,7 @@ class PlaceAnswers:
             number = int(assembly.piece[np.argmin(np.hypot(*(plate.nodes_mm - np.array(point)[:, None])))])
             own = np.zeros((3, size))
             body = assembly.bodies[number]
-            for dof in body.unknowns.tolist():
-                moved = np.zeros(size)
-                moved[dof] = _UNIT
-                own[:2, dof] = np.array(assembly.motion_mm(moved, point, large=False)) / _UNIT
+            own[:2, body.unknowns] = plate.rows_at(point) @ body.shapes_mm
             # The rotation of the body moves a probe that is displaced from its drawn position.
             own[2] = self._turn_of(number)
             self._probe_of[name] = number, own

@@ -57,6 +57,7 @@ class PlaneStressPlate:
     ) -> None:
         self.material = material
         self.plate_mm = plate_mm
+        self._located: dict[tuple[float, float], tuple[Indices, Array]] = {}
         middles = mesh.nodes_mm[:, mesh.triangles[:3]].mean(axis=1)
         self._share = shares_at(zones, middles)[:, None]
         self._moduli = held_moduli(material, self._share)
@@ -110,9 +111,15 @@ class PlaneStressPlate:
         """Corners, then middles of the edges, of every triangle as indices of `nodes_mm`, shape (6, m)."""
         return np.vstack([self._mesh.t[:3], int(self._basis.nodal_dofs.shape[1]) + self._mesh.t2f])
 
+    def weights_at(self, point: tuple[float, float]) -> tuple[Indices, Array]:
+        """Nodes of the triangle in which a point lies, and the weights of their displacements; kept by point."""
+        if point not in self._located:
+            self._located[point] = element_weights(self.nodes_mm, self.nodes_of_triangles, point)
+        return self._located[point]
+
     def rows_at(self, point: tuple[float, float]) -> Array:
         """Matrix that converts displacements to a body point's motion along x and y, shape (2, unknowns)."""
-        nodes, weights = element_weights(self.nodes_mm, self.nodes_of_triangles, point)
+        nodes, weights = self.weights_at(point)
         rows = np.zeros((2, self.unknowns))
         rows[0, self.x_dofs[nodes]] = rows[1, self.y_dofs[nodes]] = weights
         return rows

@@ -103,15 +103,9 @@ class _Tree:
         return parent
 
     def hinge(self, parent: int, start: PointMm, end: PointMm, name: str, theory: HingeTheory, segments: int) -> int:
-        """Divide a notch into segments.
-
-        If another body begins before the end of the notch, the segments on that side are shorter.
-        """
+        """Divide a notch into segments."""
         material, notch = self.gripper.material, notches_of(self.gripper)[0 if name == "hinge 1" else 1]
-        centre = self.gripper.lever.hinge1_mm if name == "hinge 1" else self.gripper.lever.hinge2_mm
         edges = notch.stations_mm(max(segments, 1))
-        for side, stop in ((edges < 0.0, start), (edges > 0.0, end)):
-            edges[side] *= float(np.hypot(*np.subtract(stop, centre))) / notch.reach_mm
         masses = masses_t(notch, material, edges)
         if segments == 0:
             whole = hinge_compliance(notch, material, theory)
@@ -139,7 +133,6 @@ def skeleton_of(
     *,
     rigid_links: bool = False,
     block: Array | None = None,
-    ends_mm: tuple[float, float] | None = None,
 ) -> Skeleton:
     """Reduce a drawing to its tree of members.
 
@@ -156,8 +149,6 @@ def skeleton_of(
         Whether only the hinges are elastic, as in the equations of Hricko & Havlik (2015).
     block : ndarray of float, shape (3, 3), or None
         Result of `drive_block_root.unit_compliance`, if already computed.
-    ends_mm : (float, float) or None
-        Distances from the middles of the two hinges to where the finger begins, if these are within the notches.
 
     Raises
     ------
@@ -168,9 +159,8 @@ def skeleton_of(
     first, second = notches_of(gripper)
     tree = _Tree(gripper)
     reaches = first.reach_mm, second.reach_mm
-    ends = reaches if ends_mm is None else (min(reaches[0], ends_mm[0]), min(reaches[1], ends_mm[1]))
-    lower1, upper1 = _hinge_ends(lever.hinge1_mm, lever.hinge1_axis_deg, reaches[0], ends[0])
-    lower2, upper2 = _hinge_ends(lever.hinge2_mm, lever.hinge2_axis_deg, reaches[1], ends[1])
+    lower1, upper1 = _hinge_ends(lever.hinge1_mm, lever.hinge1_axis_deg, reaches[0])
+    lower2, upper2 = _hinge_ends(lever.hinge2_mm, lever.hinge2_axis_deg, reaches[1])
     cross_y = links.cross_bar_mm[1]
     beam_low = cross_y - links.cross_bar_width_mm / 2.0
     pillar_x = lever.hinge1_mm[0]
@@ -255,9 +245,9 @@ def _yielding(member: Member, at_start: Array) -> Member:
     return replace(member, compliance=compliance)
 
 
-def _hinge_ends(centre: PointMm, axis_deg: float, back: float, ahead: float) -> tuple[PointMm, PointMm]:
+def _hinge_ends(centre: PointMm, axis_deg: float, reach: float) -> tuple[PointMm, PointMm]:
     c, s = cos(radians(axis_deg)), sin(radians(axis_deg))
-    return (centre[0] - back * c, centre[1] - back * s), (centre[0] + ahead * c, centre[1] + ahead * s)
+    return (centre[0] - reach * c, centre[1] - reach * s), (centre[0] + reach * c, centre[1] + reach * s)
 
 
 def _at_height(bar: tuple[float, float, float, float], y_mm: float) -> PointMm:

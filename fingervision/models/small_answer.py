@@ -10,14 +10,11 @@ from scipy.interpolate import CubicSpline
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper
-from fingervision.models.half_frame import half_frame
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.skeleton import skeleton_of
-from fingervision.models.static_answer import gap_per_input
+from fingervision.models.lumped import LumpedGripper
 
 Array = NDArray[np.float64]
 
-_SEGMENTS = 10
 _FIRST_NODES, _MOST_NODES = 13, 97
 _WITHIN = 1e-6
 
@@ -39,8 +36,8 @@ class SmallAnswer:
 
 def small_answer(gripper: Gripper, theory: HingeTheory) -> SmallAnswer:
     """Compute the response by the lumped model's frame, in a few milliseconds."""
-    half = half_frame(gripper, skeleton_of(gripper, theory, _SEGMENTS))
-    return SmallAnswer(2.0 * half.measured_rest_mm, gap_per_input(half), half.equilibrium(1.0).force_n)
+    bars = LumpedGripper(gripper, theory=theory, bars_alone=True)
+    return SmallAnswer(bars.rest_gap_mm, bars.gap_per_input, bars.force_per_input_n_mm)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """Motion of the gripper in time, in the deformed shape or with contact, integrated step by step."""
 
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -8,10 +9,10 @@ from scipy.sparse import csr_matrix, diags
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.models.damping import Damping
-from fingervision.models.driven_body import DrivenBody
+from fingervision.models.elastic_mechanism import pair_distances_mm
 from fingervision.models.generalized_alpha import integrate
-from fingervision.models.modal_model import gripper_modes
-from fingervision.models.physics import Physics
+from fingervision.models.gripper_model import DrawnGripper
+from fingervision.models.modal_model import described
 
 Array = NDArray[np.float64]
 
@@ -31,92 +32,121 @@ _RADIUS = 0.5
 kinks of the drive history, not by the mechanism."""
 
 
-def step_for(body: DrivenBody) -> float:
-    """Time step (s): a sixtieth of the period of the lowest mode with fixed drive."""
-    rad_s, _ = body.modes(drive_held=True, count=1)
-    return float(2.0 * pi / rad_s[0] / _A_PERIOD)
+class ReducedMotion:
+    """A gripper whose motion is integrated in time: the free motions of its elastic model, and the input.
 
-
-def stepped_motion(
-    body: DrivenBody, drive: DriveHistory, physics: Physics, damping: Damping, step_s: float
-) -> tuple[Array, Array]:
-    """Gap and force over one run, with the drive's motion prescribed.
+    The motion by the input includes that of the free masses which are coupled to driven ones, so that in these unknowns
+    the mass of the input is coupled to no other: a jump of the input's speed is then no impulse on the others.
 
     Parameters
     ----------
-    body : DrivenBody
-        The right half.
-    drive : DriveHistory
-        Inputs over time, linear between samples.
-    physics : Physics
-        Large rotation, contact (by a penalty), both or neither.
-    damping : Damping
-        Damping of the modes at rest; it acts on the motion relative to the static shape, as in `modal_response`.
-    step_s : float
-        Time step, as from `step_for`.
-
-    Returns
-    -------
-    gap_mm, force_n : ndarray of float, shape (n,)
-        Gap and force at the drive's samples. The drive's own inertia is not in the force, because the speed of the
-        drive jumps between straight pieces of its history.
+    model : DrawnGripper
+        The gripper, with its physics.
     """
-    usual_s = float(np.median(np.diff(drive.time_s))) if drive.time_s.size > 1 else step_s
-    # The steps divide the spacing of the samples, so that kinks of the drive history lie at the ends of steps.
-    step_s = usual_s / np.ceil(usual_s / step_s)
-    steps = max(1, int(np.ceil((drive.time_s[-1] - drive.time_s[0]) / step_s - 1e-9)))
-    time_s = drive.time_s[0] + np.arange(steps + 1) * step_s
-    history = np.interp(time_s, drive.time_s, drive.input_mm)
-    linear = body.stiffness_n_mm
-    penalty_n_mm = _PENALTY / body.face_displacement_mm[body.face].diagonal()
 
-    def internal(moved: Array) -> tuple[csr_matrix, Array]:
-        tangent, force = body.tangent(moved) if physics.large_rotation else (linear, linear @ moved)
+    def __init__(self, model: DrawnGripper) -> None:
+        self.model = model
+        self._system = system = model.elastic.vibrating(_RESOLVED_MODES + 1)
+        motions, by_input = system.motions.toarray(), system.by_input
+        coupled = motions.T @ (system.mass_t @ by_input)
+        if np.any(coupled):
+            by_input = by_input - motions @ np.linalg.solve(motions.T @ (system.mass_t @ motions), coupled)
+        self._columns = np.column_stack([motions, by_input])
+        self._mass_t = self._columns.T @ (system.mass_t @ self._columns)
+        static = np.zeros(system.unknowns)
+        static[: model.elastic.driven.unknowns] = model.elastic.driven.unit_displacement
+        self._static = np.append(np.linalg.lstsq(motions, static - by_input, rcond=None)[0], 1.0)
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns."""
+        return int(self._columns.shape[1])
+
+    @property
+    def step_s(self) -> float:
+        """Time step (s): a sixtieth of the period of the lowest mode with fixed drive."""
+        rad_s, _, _ = self._system.modes(drive_held=True, count=1)
+        return float(2.0 * pi / rad_s[0] / _A_PERIOD)
+
+    def over(self, drive: DriveHistory, damping: Damping, step_s: float) -> tuple[Array, Array]:
+        """Gap and force over one run, with the drive's motion prescribed.
+
+        Parameters
+        ----------
+        drive : DriveHistory
+            Inputs over time, linear between samples.
+        damping : Damping
+            Damping of the modes at rest; it acts on the motion relative to the static shape, as in `modal_response`.
+        step_s : float
+            Largest time step.
+
+        Returns
+        -------
+        gap_mm, force_n : ndarray of float, shape (n,)
+            Gap and force at the drive's samples. The drive's own inertia is not in the force, because the speed of the
+            drive jumps between straight pieces of its history.
+        """
+        usual_s = float(np.median(np.diff(drive.time_s))) if drive.time_s.size > 1 else step_s
+        # The steps divide the spacing of the samples, so that kinks of the drive history lie at the ends of steps.
+        step_s = usual_s / np.ceil(usual_s / step_s)
+        steps = max(1, int(np.ceil((drive.time_s[-1] - drive.time_s[0]) / step_s - 1e-9)))
+        time_s = drive.time_s[0] + np.arange(steps + 1) * step_s
+        history = np.interp(time_s, drive.time_s, drive.input_mm)
+        start, last = history[0] * self._static, self.unknowns - 1
+        motion = integrate(
+            csr_matrix(self._mass_t),
+            self._drag(damping),
+            self._internal,
+            (start, np.zeros_like(start)),
+            (np.array([last]), history),
+            np.arange(last),
+            step_s,
+            high_frequency_radius=_RADIUS,
+        )
+        gap = np.array([self._gap_mm(row) for row in motion.displacement])
+        force = np.array([self._internal(u)[1][last] for u in motion.displacement])
+        return np.interp(drive.time_s, time_s, gap), np.interp(drive.time_s, time_s, force)
+
+    def _gap_mm(self, reduced: Array) -> float:
+        elastic, large = self.model.elastic, self.model.physics.large_rotation
+        moved = (self._columns @ reduced)[: None if not large else elastic.driven.unknowns]
+        return pair_distances_mm(elastic.mechanism, elastic.probes_mm(moved, large=large), large=large)["gap"]
+
+    @cached_property
+    def _penalty_n_mm(self) -> Array:
+        driven = self.model.elastic.driven
+        slope = driven.gaps[0](np.zeros(driven.unknowns))[1]
+        return _PENALTY / np.einsum("ij,ji->i", slope.toarray(), driven.under_load(slope.toarray().T))
+
+    def _internal(self, reduced: Array) -> tuple[csr_matrix, Array]:
+        system, physics, columns = self._system, self.model.physics, self._columns
+        moved = columns @ reduced
+        if physics.large_rotation:
+            tangent, force = system.tangent(moved)
+        else:
+            tangent, force = system.stiffness_n_mm, system.stiffness_n_mm @ moved
         if physics.contact:
-            pressed = np.zeros(body.unknowns)
-            pressed[body.face] = penalty_n_mm * np.minimum(body.face_gap_mm(moved), 0.0)
-            active = np.zeros(body.unknowns)
-            active[body.face] = penalty_n_mm * (pressed[body.face] < 0.0)
-            tangent = csr_matrix(tangent + diags(active))
-            force = force + pressed
-        return tangent, force
+            gap, slope, _ = system.gaps[0](moved)
+            active = self._penalty_n_mm * (gap < 0.0)
+            tangent = csr_matrix(tangent + slope.T @ diags(active) @ slope)
+            force = force + slope.T @ (active * gap)
+        return csr_matrix(columns.T @ (tangent @ columns)), np.asarray(columns.T @ force)
 
-    start = history[0] * body.unit_displacement_mm
-    drag = _drag(body, damping)
-    motion = integrate(
-        body.mass_t,
-        drag,
-        internal,
-        (start, np.zeros_like(start)),
-        (body.driven, history),
-        body.free,
-        step_s,
-        high_frequency_radius=_RADIUS,
-    )
-    gap = np.array([2.0 * body.measured_mm(row) for row in motion.displacement])
-    moving = np.zeros(body.unknowns, dtype=bool)
-    moving[body.free] = True
-    force = np.array([
-        2.0 * float((internal(u)[1] + body.mass_t @ np.where(moving, a, 0.0))[body.driven].sum())
-        for u, a in zip(motion.displacement, motion.acceleration, strict=True)
-    ])  # fmt: skip
-    return np.interp(drive.time_s, time_s, gap), np.interp(drive.time_s, time_s, force)
+    def _drag(self, damping: Damping) -> csr_matrix:
+        """Damping matrix for motion relative to the static shape.
 
-
-def _drag(body: DrivenBody, damping: Damping) -> csr_matrix:
-    """Damping matrix for motion relative to the static shape.
-
-    For the modes that the damping law describes and the time step resolves, the damping matrix is M Phi diag(2 zeta w)
-    Phi' M, with the mass matrix M, the mode shapes Phi, the damping ratios zeta and the angular frequencies w. Modes
-    that the damping law does not describe, or the time step does not resolve, have a damping proportional to their
-    stiffness, so strong that these modes follow the drive without delay, as in `modal_model`.
-    """
-    model, ratios = gripper_modes(body, _RESOLVED_MODES).damped(damping)
-    rad_s, shapes = body.modes(drive_held=True, count=_RESOLVED_MODES + 1)
-    pushed = body.mass_t @ shapes[:, : model.rad_s.size]
-    matrix = (pushed * (2.0 * ratios * model.rad_s)) @ pushed.T
-    rest = body.stiffness_n_mm.toarray() - (pushed * model.rad_s**2) @ pushed.T
-    matrix += 2.0 * _OVERDAMPED / rad_s[model.rad_s.size] * rest
-    follows = matrix @ body.unit_displacement_mm
-    matrix[:, body.driven] -= follows[:, None] / body.driven.size
-    return csr_matrix(matrix)
+        For the modes that the damping law describes and the time step resolves, the damping matrix is M Phi diag(2 zeta
+        w) Phi' M, with the mass matrix M, the mode shapes Phi, the damping ratios zeta and the angular frequencies w.
+        Modes that the damping law does not describe, or the time step does not resolve, have a damping proportional to
+        their stiffness, so strong that these modes follow the drive without delay, as in `modal_model`.
+        """
+        ratios = described(damping, self._system.modes(drive_held=True, count=_RESOLVED_MODES)[0])
+        rad_s, shapes, _ = self._system.modes(drive_held=True, count=_RESOLVED_MODES + 1)
+        described_rad_s = rad_s[: ratios.size]
+        pushed = self._columns.T @ (self._system.mass_t @ shapes[:, : ratios.size])
+        matrix = (pushed * (2.0 * ratios * described_rad_s)) @ pushed.T
+        stiffness = self._columns.T @ (self._system.stiffness_n_mm @ self._columns)
+        rest = stiffness - (pushed * described_rad_s**2) @ pushed.T
+        matrix += 2.0 * _OVERDAMPED / rad_s[ratios.size] * rest
+        matrix[:, -1] -= matrix @ self._static
+        return csr_matrix(matrix)

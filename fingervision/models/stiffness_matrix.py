@@ -31,14 +31,13 @@ from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
 from fingervision.models.answer_figures import ModelFigures
-from fingervision.models.covered_inputs import covered_inputs_mm
+from fingervision.models.elastic_mechanism import STANDARD_GRAVITY_MM_S2
 from fingervision.models.grip import Part
-from fingervision.models.gripper_bodies import gripper_poses, poses_of_frame
-from fingervision.models.half_frame import half_frame
+from fingervision.models.gripper_model import covered_inputs_mm
 from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.skeleton import Member, Skeleton, skeleton_of
-from fingervision.models.steady_loads import STANDARD_GRAVITY_MM_S2
 
 Array = NDArray[np.float64]
 
@@ -182,14 +181,14 @@ class StiffnessMatrixGripper:
     def __init__(
         self, gripper: Gripper, theory: HingeTheory = HingeTheory.CORRECTED, *, rigid_links: bool = False
     ) -> None:
-        self.gripper = gripper
+        self.gripper, self.theory = gripper, theory
         self.skeleton = skeleton_of(gripper, theory, 0, rigid_links=rigid_links)
         self._chain = ComplianceChain(self.skeleton)
 
     @property
     def input_range_mm(self) -> tuple[float, float]:
         """Smallest and largest input for which the model is valid (mm)."""
-        return covered_inputs_mm(self.gripper, self.first_touch_mm())
+        return covered_inputs_mm(self.gripper, self.first_touch_mm)
 
     @property
     def rest_gap_mm(self) -> float:
@@ -298,8 +297,7 @@ class StiffnessMatrixGripper:
 
         The stiffness matrix is condensed from the members; for poses the members themselves are used.
         """
-        poses = poses_of_frame(self.gripper, self.skeleton, large=False)
-        return gripper_poses(half_frame(self.gripper, self.skeleton), LINEAR, poses, input_mm)
+        return LumpedGripper(self.gripper, theory=self.theory, bars_alone=True, segments=0).body_poses(input_mm)
 
     @cached_property
     def _corner_per_input(self) -> float:
@@ -307,6 +305,7 @@ class StiffnessMatrixGripper:
         flexibility = self._chain.flexibility(self.skeleton.corner, self.skeleton.drive)
         return float((flexibility @ self._load_by_input)[_X])
 
+    @cached_property
     def first_touch_mm(self) -> float | None:
         """Input at which the tip's corner meets the symmetry plane (mm); None if the corner does not move."""
         slope = self._corner_per_input
@@ -317,7 +316,7 @@ class StiffnessMatrixGripper:
         return ModelFigures(
             self.gap_per_input,
             self.input_stiffness_n_mm,
-            contact_input_mm=self.first_touch_mm(),
+            contact_input_mm=self.first_touch_mm,
             out_of_plane_modes_hz=self.out_of_plane_modes_hz(),
             sag_out_of_plane_mm=self.gravity_sag_mm()[0],
             slope_error=_SLOPE_ERROR,

@@ -12,9 +12,7 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.gripper import Gripper, Material, PointMm
-from fingervision.models.hinge_correction import plane_strain_share
-from fingervision.models.notch import notches_of
+from fingervision.domain.gripper import Material, PointMm
 
 Array = NDArray[np.float64]
 
@@ -53,18 +51,6 @@ class ConstrainedZone:
         return np.asarray(
             (np.abs(c * x + s * y) <= self.half_length_mm) & (np.abs(c * y - s * x) <= self.half_height_mm)
         )
-
-
-def gripper_zones(gripper: Gripper) -> tuple[ConstrainedZone, ...]:
-    """The zones of a gripper's two hinges."""
-    lever = gripper.lever
-    places = ((lever.hinge1_mm, lever.hinge1_axis_deg), (lever.hinge2_mm, lever.hinge2_axis_deg))
-    return tuple(
-        ConstrainedZone(
-            centre, axis_deg, notch.reach_mm, notch.depth_mm + 0.5 * notch.thickness_mm, plane_strain_share(notch)
-        )
-        for (centre, axis_deg), notch in zip(places, notches_of(gripper), strict=True)
-    )
 
 
 def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.grip import Part, first_grip_mm, grip_equilibrium
+from fingervision.models.grip import Part, first_grip_mm, gripped
 from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
 from tests.benchmarks.models_held_out import HELD_OUT, drawn
@@ -33,8 +33,8 @@ def main() -> None:
         grips, modes = [], []
         lumped = LumpedGripper(gripper)
         for model in (lumped, FiniteElementGripper(gripper)):
-            first = first_grip_mm(model.half, PART) or 0.0
-            grips.append(float(grip_equilibrium(model.half, first - BEYOND_MM, PART).contact_n.sum()))
+            first = first_grip_mm(model, PART) or 0.0
+            grips.append(gripped(model, first - BEYOND_MM, PART).grip_n)
             modes.append(model.modes_hz(drive_held=True, count=1)[0])
         apart = [100.0 * (one / other - 1.0) for one, other in (grips, modes)]
         stated = lumped.figures()

@@ -41,7 +41,7 @@ def main() -> None:
         mesh = mesh_outline(gripper, ElementSize(0.075, 1.3))
         model = FiniteElementGripper(gripper, mesh=mesh)
         model.respond(inputs)
-        unknowns.append(model.half.unknowns)
+        unknowns.append(model.plate.unknowns)
 
     _row("finite elements, mesh and plane stress (at most 1.5 s at 45 000 unknowns)", solve)
     print(f"  unknowns: {unknowns[-1]}")

@@ -82,7 +82,9 @@ def cases() -> list[tuple[str, Mechanism, Gripper | None]]:
     for row in GRIPPERS:
         gripper = gripper_of(sample, row)
         name = f"{row[0].name} x{row[1]:g}, t {row[2]:g}, R {row[3]:g}, plate {row[4]:g}"
-        found.append((name, half_mechanism(gripper), gripper))
+        half = half_mechanism(gripper)
+        alone = replace(half, mirrored=False, probes={"tip": gripper.measuring_point_mm}, pairs={})
+        found.append((name, alone, gripper))
     other = replace(sample, hinge=replace(sample.hinge, thickness_mm=0.7))
     found.append(("asymmetric gripper, t 1 and 0.7", whole_mechanism(sample, other, "asymmetric"), None))
     for path in sorted((Path(__file__).parent / "mechanisms").glob("*.toml")):

@@ -207,7 +207,7 @@ def test_modes_are_written_and_drawn(tmp_path: Path) -> None:
 def test_a_part_is_gripped(tmp_path: Path) -> None:
     output = run(GRIPPER, "--kind", "lumped", "--object-mm", "3", "--object-n-mm", "50", "--out", tmp_path)
     model = LumpedGripper(read_gripper(GRIPPER))
-    touch = first_grip_mm(model.half, Part(3.0))
+    touch = first_grip_mm(model, Part(3.0))
     assert touch is not None
     assert f"lumped: a part of 3 mm (50 N/mm) is touched at {touch:.4g} mm of input" in output
     with (tmp_path / "grip.csv").open() as file:

@@ -9,7 +9,6 @@ import pytest
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.large_rotation import large_path
 from fingervision.models.reference_mesh import PlaneMesh
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (Debian package calculix-ccx) is absent")
@@ -116,8 +115,7 @@ def test_three_dimensions_agree(
     heights = {body.nodes[node][1]: value for node, value in across.items() if body.nodes[node][2] == 1.5}
     top = sorted(heights)[-3:]
     moved = float(np.polyval(np.polyfit(top, [heights[y] for y in top], 2), 99.7))
-    half = finite_element.half
-    ours = large_path(half, input_mm)[-1] if large else half.equilibrium(input_mm)
-    slope = 2.0 * (half.measured_mm(ours.displacement_mm) - half.measured_rest_mm) / input_mm
+    ours = finite_element.elastic.state(input_mm, large_rotation=large)
+    slope = (ours.pairs_mm["gap"] - finite_element.rest_gap_mm) / input_mm
     assert 2.0 * moved / input_mm == pytest.approx(slope, rel=SLOPE)
     assert force_n == pytest.approx(ours.force_n, rel=FORCE)

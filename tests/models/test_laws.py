@@ -135,7 +135,7 @@ def test_a_softer_material_leaves_the_gap(drawn: PhysicalGripper, gripper: Gripp
 
 def test_contact_is_the_bodys_own_with_its_force(drawn: PhysicalGripper, gripper: Gripper) -> None:
     met = LumpedGripper(gripper, Physics(contact=True))
-    touch_mm = met.half.first_touch_mm()
+    touch_mm = met.first_touch_mm
     assert touch_mm is not None
     at = np.array([touch_mm - 0.02, touch_mm - 0.05, touch_mm])
     gap = met.respond(at).gap_mm

@@ -18,7 +18,6 @@ from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.physics import Physics
 from fingervision.models.redrawn import redrawn
-from fingervision.models.static_answer import gap_per_input
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.models_sway_table import stiffnesses
@@ -32,8 +31,8 @@ SAME_DRAWING = 2e-4
 
 def test_the_template_has_the_gripper_s_figures(gripper: Gripper, finite_element: FiniteElementGripper) -> None:
     unit = MechanismPlate(half_mechanism(gripper)).state(1.0)
-    assert 2.0 * unit.probes_mm["tip"][0] == pytest.approx(gap_per_input(finite_element.half), rel=SAME_DRAWING)
-    assert 2.0 * unit.force_n == pytest.approx(finite_element.half.equilibrium(1.0).force_n, rel=SAME_DRAWING)
+    assert 2.0 * unit.probes_mm["right tip"][0] == pytest.approx(finite_element.gap_per_input, rel=SAME_DRAWING)
+    assert unit.force_n == pytest.approx(finite_element.force_per_input_n_mm, rel=SAME_DRAWING)
 
 
 @pytest.mark.slow
@@ -46,8 +45,8 @@ def test_lumped_half_beside_finite_elements(gripper: Gripper, thickness: float, 
     )
     frame, solid = MechanismFrame(half_mechanism(drawn)), FiniteElementGripper(drawn)
     unit = frame.state(1.0)
-    assert 2.0 * unit.probes_mm["tip"][0] == pytest.approx(gap_per_input(solid.half), rel=SLOPE)
-    assert 2.0 * unit.force_n == pytest.approx(solid.half.equilibrium(1.0).force_n, rel=FORCE)
+    assert 2.0 * unit.probes_mm["right tip"][0] == pytest.approx(solid.gap_per_input, rel=SLOPE)
+    assert unit.force_n == pytest.approx(solid.force_per_input_n_mm, rel=FORCE)
     assert unit.stress_mpa == pytest.approx(solid.peak_stress().mpa_per_mm, rel=FORCE)
     for held in (False, True):
         ours = frame.modes_hz(drive_held=held, count=2)
@@ -79,7 +78,8 @@ def test_an_asymmetric_gripper_mirrors_with_its_drawing(gripper: Gripper) -> Non
 
 
 def test_the_chain_is_the_paper_s_matrix(gripper: Gripper) -> None:
-    chain, paper = MechanismChain(half_mechanism(gripper)), StiffnessMatrixGripper(gripper, rigid_links=True)
+    alone = replace(half_mechanism(gripper), mirrored=False, probes={"tip": gripper.measuring_point_mm}, pairs={})
+    chain, paper = MechanismChain(alone), StiffnessMatrixGripper(gripper, rigid_links=True)
     unit = chain.state(1.0)
     assert 2.0 * unit.force_n == pytest.approx(paper.input_stiffness_n_mm, rel=1e-4)
     assert 2.0 * unit.probes_mm["tip"][0] == pytest.approx(paper.gap_per_input, rel=1e-4)

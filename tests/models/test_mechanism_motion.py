@@ -80,16 +80,20 @@ def test_lumped_motion_against_an_adaptive_integration(bridge: MechanismFrame, d
 
 def test_lumped_frequency_response_against_the_full_matrices(arms: MechanismFrame) -> None:
     """Compared with (K - w^2 M) u = f for all frames and own modes, nearly undamped, with drives held and free."""
-    vibration = arms._vibration(10)
-    K, M, free, by = vibration.stiffness_n_mm, vibration.mass_t, vibration.free, vibration.by_input
+    system = arms.vibrating(10)
+    K, M, free, by = (
+        system.stiffness_n_mm.toarray(),
+        system.mass_t.toarray(),
+        system.motions.toarray(),
+        system.by_input,
+    )
     model, loose = arms.modal_model(10), arms.free_modes(10)
     at = np.array([0.3, 0.9]) * model.modes_hz[0]
     found = frequency_response(model, loose, at, ModalDamping(1e-6))
-    observed = arms._probes_by(vibration, np.eye(by.size))
+    observed = arms.probes_by(np.eye(by.size))
     for place, frequency in enumerate(at):
         dynamic = K - (2 * np.pi * frequency) ** 2 * M
-        moved = by.copy()
-        moved[free] = np.linalg.solve(dynamic[np.ix_(free, free)], -(dynamic @ by)[free])
+        moved = by - free @ np.linalg.solve(free.T @ dynamic @ free, free.T @ dynamic @ by)
         assert found.per_input["tip_x_mm"][place].real == pytest.approx(observed["tip"][0] @ moved, rel=HALF_PERCENT)
         # With free drives, the force acts on the drives, which move in their ratio.
         force = by @ dynamic @ moved

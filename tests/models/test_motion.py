@@ -15,7 +15,6 @@ from fingervision.models.damping_text import parse_damping
 from fingervision.models.frequency_response import frequency_response, resolved_frequencies_hz
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.models.modal_model import gripper_free_modes, gripper_modes
 from fingervision.models.modal_response import modal_motion
 from fingervision.models.motion_in_time import gripper_motion
 from fingervision.models.physics import Physics
@@ -36,7 +35,7 @@ def test_step_response_against_an_adaptive_integration(lumped: LumpedGripper, da
     """A step of 0.5 mm within 2 ms, compared with scipy's DOP853 on the modes' equations, with kinks of the drive as
     jumps of speed.
     """
-    model = gripper_modes(lumped.half, 3)
+    model = lumped.modal_model(3)
     drive = steps((0.0, 0.0), (0.002, 0.5), (0.03, 0.5))
     found = modal_motion(model, drive, damping)
     kept, ratios = found.modes_hz.size, found.damping_ratios
@@ -66,7 +65,7 @@ def test_logarithmic_decrement_is_the_damping_asked_for(lumped: LumpedGripper, r
     period = 1.0 / lumped.modes_hz(drive_held=True)[0] / np.sqrt(1 - ratio**2)
     peaks = 0.001 + 0.37 * period + np.arange(8) * period
     drive = DriveHistory(np.concatenate([[0.0, 0.001], peaks]), np.array([0.0, 0.1, *[0.1] * 8]))
-    found = modal_motion(gripper_modes(lumped.half, 1), drive, ModalDamping(ratio))
+    found = modal_motion(lumped.modal_model(1), drive, ModalDamping(ratio))
     ring = (found.observed_mm["gap_mm"] - found.static_mm["gap_mm"])[2:]
     decrement = np.log(ring[:-1] / ring[1:])
     assert decrement == pytest.approx(2 * np.pi * ratio / np.sqrt(1 - ratio**2), rel=ONE_PERCENT)
@@ -74,22 +73,19 @@ def test_logarithmic_decrement_is_the_damping_asked_for(lumped: LumpedGripper, r
 
 def test_force_of_a_sine_is_the_dynamic_stiffness(lumped: LumpedGripper) -> None:
     """Force over time against the full matrices at one frequency, with modal damping only."""
-    frequency, half = 120.0, lumped.half
+    frequency, system = 120.0, lumped.elastic.vibrating(8)
     time_s = np.arange(0.0, 0.5, 5e-5)
     drive = DriveHistory(time_s, 0.1 * np.sin(2 * np.pi * frequency * time_s))
-    found = modal_motion(gripper_modes(half, 8), drive, ModalDamping(0.02))
-    K, M = half.stiffness_n_mm.toarray(), half.mass_t.toarray()
-    w2 = (2 * np.pi * frequency) ** 2
-    dynamic = K - w2 * M
-    moved = np.zeros(half.unknowns)
-    moved[half.driven] = 1.0
-    inside = np.ix_(half.free, half.free)
-    moved[half.free] = np.linalg.solve(dynamic[inside], -(dynamic @ moved)[half.free])
+    model = lumped.modal_model(8)
+    found = modal_motion(model, drive, ModalDamping(0.02))
+    w2, free = (2 * np.pi * frequency) ** 2, system.motions.toarray()
+    dynamic = system.stiffness_n_mm.toarray() - w2 * system.mass_t.toarray()
+    drawn = system.by_input
+    moved = drawn - free @ np.linalg.solve(free.T @ dynamic @ free, free.T @ dynamic @ drawn)
     # The last quarter is steady; the inertia outside the modes acts on the drive at kinks only.
     steady = time_s > 0.375
-    model = gripper_modes(half, 8)
     rest_t = model.mass_t - float(np.sum(model.participation**2))
-    expected = 2.0 * float((dynamic @ moved)[half.driven].sum()) + rest_t * w2
+    expected = float(drawn @ dynamic @ moved) + rest_t * w2
     turning = np.exp(-2j * np.pi * frequency * time_s[steady])
     amplitude = 2.0 * np.abs(np.mean(found.force_n[steady] * turning))
     assert amplitude == pytest.approx(0.1 * abs(expected), rel=0.02)
@@ -97,39 +93,36 @@ def test_force_of_a_sine_is_the_dynamic_stiffness(lumped: LumpedGripper) -> None
 
 def test_frequency_response_against_the_full_matrices(lumped: LumpedGripper) -> None:
     """Compared with (K - w^2 M + i w C) u = f of the whole frame, with C from all modes, drive held and free."""
-    half, ratio = lumped.half, 0.025
+    ratio, tip = 0.025, lumped.gap_change_mm
     at = np.array([5.0, 45.0, 46.06, 47.0, 200.0, 340.0, 347.0, 354.0, 450.0])
-    found = frequency_response(gripper_modes(half, 12), gripper_free_modes(half, 12), at, ModalDamping(ratio))
-    K, M = half.stiffness_n_mm.toarray(), half.mass_t.toarray()
+    found = frequency_response(lumped.modal_model(12), lumped.free_modes(12), at, ModalDamping(ratio))
+    system = lumped.elastic.vibrating(12)
+    K, M, inside = system.stiffness_n_mm.toarray(), system.mass_t.toarray(), system.motions.toarray()
+    every = np.column_stack([inside, system.by_input])
 
     def damping(count: int, *, held: bool) -> np.ndarray:
-        rad_s, shapes = half.modes(drive_held=held, count=count)
+        rad_s, shapes, _ = system.modes(drive_held=held, count=count)
         return (M @ shapes * (2 * ratio * rad_s)) @ (M @ shapes).T
 
-    static = half.unit_displacement_mm
+    static = system.unit_displacement
     held, free = damping(40, held=True), damping(40, held=False)
     for place, f in enumerate(at):
         w = 2 * np.pi * f
-        inside = np.ix_(half.free, half.free)
         # Damping acts on the motion relative to the static shape.
         dynamic = K - w**2 * M + 1j * w * held
-        beside = np.zeros(half.unknowns, complex)
-        beside[half.free] = np.linalg.solve(dynamic[inside], (w**2 * M @ static)[half.free])
-        gap = 2.0 * (static + beside)[half.measured] @ half.weights
-        assert abs(found.per_input["gap_mm"][place] - gap[()]) < HALF_PERCENT * abs(gap)
-        every = np.union1d(half.free, half.driven)
-        push = np.zeros(half.unknowns)
-        push[half.driven] = 0.5
-        moved = np.zeros(half.unknowns, complex)
-        moved[every] = np.linalg.solve((K - w**2 * M + 1j * w * free)[np.ix_(every, every)], push[every])
-        gap = 2.0 * moved[half.measured] @ half.weights
+        moved = static + inside @ np.linalg.solve(inside.T @ dynamic @ inside, w**2 * inside.T @ M @ static)
+        gap = tip(moved.real) + 1j * tip(moved.imag)
+        assert abs(found.per_input["gap_mm"][place] - gap) < HALF_PERCENT * abs(gap)
+        push = np.append(np.zeros(inside.shape[1]), 1.0)
+        answer = np.linalg.solve(every.T @ (K - w**2 * M + 1j * w * free) @ every, push)
+        moved, drive = every @ answer, answer[-1]
+        gap = tip(moved.real) + 1j * tip(moved.imag)
         assert abs(found.per_force_mm_n["gap_mm"][place] - gap) < HALF_PERCENT * abs(gap)
-        drive = moved[half.driven][0]
         assert abs(found.drive_per_force_mm_n[place] - drive) < HALF_PERCENT * abs(drive)
 
 
 def test_half_power_width_is_the_damping_asked_for(lumped: LumpedGripper) -> None:
-    model, free, law = gripper_modes(lumped.half, 6), gripper_free_modes(lumped.half, 6), ModalDamping(0.01)
+    model, free, law = lumped.modal_model(6), lumped.free_modes(6), ModalDamping(0.01)
     at = resolved_frequencies_hz(model, free, law, 40.0, 52.0)
     size = np.abs(frequency_response(model, free, at, law).per_force_mm_n["gap_mm"])
     wide = at[size > size.max() / np.sqrt(2.0)]
@@ -140,7 +133,7 @@ def test_half_power_width_is_the_damping_asked_for(lumped: LumpedGripper) -> Non
 
 
 def test_equation_4_describes_the_lowest_modes_alone(lumped: LumpedGripper) -> None:
-    found = modal_motion(gripper_modes(lumped.half, 8), steps((0.0, 0.0), (0.01, 0.1)), PaperDamping())
+    found = modal_motion(lumped.modal_model(8), steps((0.0, 0.0), (0.01, 0.1)), PaperDamping())
     # zeta(1) = 0.045 gamma by the dimensionless equation, with gamma = 0.5; the ratio of the second mode would be 0.45.
     assert found.damping_ratios == pytest.approx([0.0225], rel=0.01)
     assert found.modes_hz.size == 1
@@ -189,7 +182,7 @@ def test_runs_begin_at_rest_each(lumped: LumpedGripper) -> None:
 
 def test_heavier_material_vibrates_slower(gripper: Gripper) -> None:
     heavy = replace(gripper, material=replace(gripper.material, density_kg_m3=4 * 930.0))
-    modes = [gripper_modes(LumpedGripper(g).half, 2).modes_hz for g in (gripper, heavy)]
+    modes = [LumpedGripper(g).modal_model(2).modes_hz for g in (gripper, heavy)]
     assert modes[0] == pytest.approx(2.0 * modes[1], rel=1e-9)
 
 

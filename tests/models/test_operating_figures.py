@@ -10,10 +10,9 @@ from scipy.optimize import minimize
 from fingervision.domain.gripper import Gripper, SNLine
 from fingervision.models.endurance import endurance
 from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.grip import Part, first_grip_mm, grip_equilibrium, mechanical_advantage
+from fingervision.models.grip import Part, first_grip_mm, gripped, mechanical_advantage
 from fingervision.models.gripper_figures import operating_figures
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.steady_loads import gap_by_weight_mm, midline_by_weight_mm, thermal_displacement_mm
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 ONE_PERCENT = 0.01
@@ -22,11 +21,13 @@ ONE_PERCENT = 0.01
 @pytest.mark.parametrize("stiffness", [inf, 50.0, 1.0])
 def test_grip_is_the_least_energy(lumped: LumpedGripper, stiffness: float) -> None:
     """Compared with scipy's SLSQP on the energy of finger and part; the face's points are outside the squeezed part."""
-    half, width, input_mm = lumped.half, 3.0, -0.3
-    state = grip_equilibrium(half, input_mm, Part(width, stiffness))
-    compliance = half.face_displacement_mm[half.face]
+    driven, width, input_mm = lumped.elastic.driven, 3.0, -0.3
+    state = gripped(lumped, input_mm, Part(width, stiffness))
+    gap, face, _ = driven.gaps[0](np.zeros(driven.unknowns))
+    # The model's forces are those of both halves.
+    compliance = 2.0 * face @ driven.under_load(face.toarray().T)
     K = np.linalg.inv(0.5 * (compliance + compliance.T))
-    free = half.face_gap_mm(input_mm * half.unit_displacement_mm)
+    free = gap + input_mm * face @ driven.unit_displacement
     soft = min(stiffness, 1e4)
 
     def energy(x: np.ndarray) -> float:
@@ -36,9 +37,9 @@ def test_grip_is_the_least_energy(lumped: LumpedGripper, stiffness: float) -> No
     outside = {"type": "ineq", "fun": lambda x: free + x[:-1] - 0.5 * width + x[-1]}
     best = minimize(energy, np.array([0.2] * free.size + [0.0]), constraints=[outside], options={"ftol": 1e-14})
     grip = 2.0 * soft * best.x[-1]
-    assert float(state.contact_n.sum()) == pytest.approx(grip, rel=ONE_PERCENT)
-    assert first_grip_mm(half, Part(width)) == pytest.approx(0.25 * half.first_touch_mm(), rel=1e-9)
-    assert grip_equilibrium(half, 0.0, Part(width)).contact_n.sum() == 0.0
+    assert state.grip_n == pytest.approx(grip, rel=ONE_PERCENT)
+    assert first_grip_mm(lumped, Part(width)) == pytest.approx(0.25 * lumped.first_touch_mm, rel=1e-9)
+    assert gripped(lumped, 0.0, Part(width)).grip_n == 0.0
 
 
 @pytest.mark.parametrize("cross_bar_mm", [8.0, 5.0])
@@ -47,8 +48,8 @@ def test_grip_is_that_of_finite_elements(gripper: Gripper, cross_bar_mm: float) 
     part = Part(2.0, 50.0)
     grips = []
     for model in (LumpedGripper(drawn), FiniteElementGripper(drawn)):
-        touch = first_grip_mm(model.half, part) or 0.0
-        grips.append(float(grip_equilibrium(model.half, touch - 0.2, part).contact_n.sum()))
+        touch = first_grip_mm(model, part) or 0.0
+        grips.append(gripped(model, touch - 0.2, part).grip_n)
     assert grips[0] == pytest.approx(grips[1], rel=0.005)
 
 
@@ -57,7 +58,7 @@ def test_kinds_grip_alike(gripper: Gripper) -> None:
     lumped = LumpedGripper(gripper, bars_alone=True)
     for part in (Part(3.0), Part(3.0, 20.0)):
         by_matrix = StiffnessMatrixGripper(gripper).grip_force_n(-0.2, part)
-        assert float(grip_equilibrium(lumped.half, -0.2, part).contact_n.sum()) == pytest.approx(by_matrix, rel=0.01)
+        assert gripped(lumped, -0.2, part).grip_n == pytest.approx(by_matrix, rel=0.01)
 
 
 def test_mechanical_advantage_is_reciprocal(lumped: LumpedGripper) -> None:
@@ -66,19 +67,21 @@ def test_mechanical_advantage_is_reciprocal(lumped: LumpedGripper) -> None:
     The ratio of grip to force is therefore (a / c) / (k + 2 a^2 / c), with the tip's motion a per input, its compliance
     c with the drive held, and the stiffness k.
     """
-    half = lumped.half
-    place = int(np.argmin(half.face_gap_mm(-0.5 * half.unit_displacement_mm)))
-    a = half.unit_displacement_mm[half.face[place]]
-    c = half.face_displacement_mm[half.face[place], place]
-    k = half.equilibrium(1.0).force_n
-    assert mechanical_advantage(half) == pytest.approx((a / c) / (k + 2.0 * a**2 / c), rel=1e-6)
+    driven = lumped.elastic.driven
+    gap, face, _ = driven.gaps[0](np.zeros(driven.unknowns))
+    place = int(np.argmin(gap - 0.5 * lumped.face_per_input))
+    a = lumped.face_per_input[place]
+    row = face.toarray()[place]
+    c = 2.0 * row @ driven.under_load(row)
+    k = lumped.force_per_input_n_mm
+    assert mechanical_advantage(lumped) == pytest.approx((a / c) / (k + 2.0 * a**2 / c), rel=1e-6)
 
 
 def test_tip_moves_and_turns_as_a_lever(lumped: LumpedGripper) -> None:
     """Rigid links rotate by 1 / l2 per input about hinge 1: the motion of the tip along the finger is its distance from
     hinge 1 across the finger times this angle.
     """
-    own, lever = operating_figures(lumped.gripper, lumped.half), lumped.gripper.lever
+    own, lever = operating_figures(lumped), lumped.gripper.lever
     turn = 1.0 / lever.l2_mm
     assert np.radians(own.tip_turn_deg_per_mm) == pytest.approx(turn, rel=0.03)
     assert own.tip_along_per_input == pytest.approx(turn * (lever.hinge1_mm[0] - 2.0), rel=0.03)
@@ -88,29 +91,19 @@ def test_weight_is_that_of_the_density_and_kinds_agree(
     gripper: Gripper, lumped: LumpedGripper, finite_element: FiniteElementGripper
 ) -> None:
     heavy = replace(gripper, material=replace(gripper.material, density_kg_m3=2 * 930.0))
-    assert gap_by_weight_mm(LumpedGripper(heavy).half) == pytest.approx(2.0 * gap_by_weight_mm(lumped.half), rel=1e-9)
-    for of in (gap_by_weight_mm, midline_by_weight_mm):
-        assert of(lumped.half) == pytest.approx(of(finite_element.half), rel=0.07)
+    once, twice, solid = (operating_figures(model) for model in (lumped, LumpedGripper(heavy), finite_element))
+    assert twice.gap_by_weight_mm == pytest.approx(2.0 * once.gap_by_weight_mm, rel=1e-9)
+    assert once.gap_by_weight_mm == pytest.approx(solid.gap_by_weight_mm, rel=0.01)
+    assert once.midline_by_weight_mm == pytest.approx(solid.midline_by_weight_mm, rel=0.01)
     # By Rayleigh's quotient, a single swaying mode dominates, so that the shift is about g / w^2.
     (first,) = lumped.swaying_modes_hz()
-    assert midline_by_weight_mm(lumped.half) == pytest.approx(9806.65 / (2 * np.pi * first) ** 2, rel=0.6)
-
-
-def test_a_body_whose_supports_grow_too_only_grows(finite_element: FiniteElementGripper) -> None:
-    half = finite_element.half
-    grown = np.zeros(half.unknowns)
-    grown[half.nodes[:, 0]], grown[half.nodes[:, 1]] = 1e-3 * half.nodes_mm.T
-    moved, force = thermal_displacement_mm(half, 1e-3, grown)
-    assert moved == pytest.approx(grown, abs=1e-12)
-    assert np.abs(force).max() < 1e-8
-    # The gap then grows by the thermal strain.
-    assert 2.0 * (half.measured_mm(moved) - half.measured_rest_mm) == pytest.approx(4e-3, rel=1e-6)
+    assert once.midline_by_weight_mm == pytest.approx(9806.65 / (2 * np.pi * first) ** 2, rel=0.6)
 
 
 def test_thermal_growth_by_a_second_way(gripper: Gripper, finite_element: FiniteElementGripper) -> None:
     """Clamp and drive face stay in place: the body first expands freely; then clamp and drive face are moved back."""
     warm = replace(gripper, material=replace(gripper.material, thermal_expansion_per_k=1e-4))
-    own = operating_figures(warm, finite_element.half)
+    own = operating_figures(FiniteElementGripper(warm))
     # Expansion about the middle of the clamp moves the drive face by 2.57 mm, and both pillars by 35.5 mm, times the
     # strain. Moving them back changes the gap by the slope along the drive, and directly across the pillars.
     slope = 7.7196
@@ -118,7 +111,7 @@ def test_thermal_growth_by_a_second_way(gripper: Gripper, finite_element: Finite
     pillars_mm = 1e-4 * 2.0 * 35.5
     assert own.gap_per_kelvin_mm is not None
     assert abs(own.gap_per_kelvin_mm - expected) < pillars_mm
-    assert operating_figures(gripper, finite_element.half).gap_per_kelvin_mm is None
+    assert operating_figures(finite_element).gap_per_kelvin_mm is None
 
 
 @pytest.mark.parametrize("low", [-20.0, -5.0, 0.0])

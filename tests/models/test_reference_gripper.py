@@ -8,8 +8,8 @@ import pytest
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.large_rotation import first_touch, large_equilibrium, large_path
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physics import Physics
 from fingervision.models.published_table import COMSOL_MM, INPUT_MM
@@ -49,10 +49,9 @@ def test_the_peak_stress_lies_on_a_notch_and_not_in_the_singular_corner(finite_e
 
 
 def test_large_rotation_opens_a_little_more(plane_stress: FiniteElementGripper) -> None:
-    half = plane_stress.half
-    state = large_path(half, 1.8)[-1]
-    gap_mm = 2.0 * half.measured_mm(state.displacement_mm)
-    linear_mm = 2.0 * half.measured_mm(1.8 * half.unit_displacement_mm)
+    state = plane_stress.elastic.state(1.8, large_rotation=True)
+    gap_mm = state.pairs_mm["gap"]
+    linear_mm = plane_stress.elastic.state(1.8).pairs_mm["gap"]
     # The material point opens by 0.057 mm more than in the linear model, which gives 17.898 mm.
     assert gap_mm == pytest.approx(17.955, abs=0.01)
     assert gap_mm - linear_mm == pytest.approx(0.057, abs=0.005)
@@ -61,29 +60,37 @@ def test_large_rotation_opens_a_little_more(plane_stress: FiniteElementGripper) 
 
 def test_the_width_of_the_hinges_gives_the_force_of_three_dimensions(finite_element: FiniteElementGripper) -> None:
     # Bricks of the whole gripper: 2.06 N/mm and a slope within 0.03 % of plane stress; 3.92 N at 1.8 mm, deformed.
-    assert finite_element.half.equilibrium(1.0).force_n == pytest.approx(2.06, rel=FORCE)
+    assert finite_element.force_per_input_n_mm == pytest.approx(2.06, rel=FORCE)
     assert finite_element.respond(np.array([0.0, 1.0])).gap_mm[1] - 4.0 == pytest.approx(7.7212, rel=3e-4)
-    assert large_path(finite_element.half, 1.8)[-1].force_n == pytest.approx(3.92, rel=FORCE)
+    assert finite_element.elastic.driven.equilibrium(1.8, large_rotation=True).force_n == pytest.approx(3.92, rel=FORCE)
 
 
 def test_the_micro_design_in_three_dimensions(gripper: Gripper) -> None:
     # For a width of 10 times the thickness, brick elements give 10.04 N/mm, plane stress 9.24 N/mm.
     micro = read_gripper(Path(__file__).parents[2] / "fingervision" / "models" / "micro_gripper.toml")
-    assert FiniteElementGripper(micro).half.equilibrium(1.0).force_n == pytest.approx(10.04, rel=FORCE)
+    assert FiniteElementGripper(micro).force_per_input_n_mm == pytest.approx(10.04, rel=FORCE)
 
 
 @pytest.mark.slow
 def test_the_top_corner_touches_first_in_large_rotation_too(finite_element: FiniteElementGripper) -> None:
-    half = finite_element.half
-    touch = first_touch(half, half.first_touch_mm() or 0.0)
-    gaps = half.face_gap_mm(touch.displacement_mm)
-    assert touch.input_mm == pytest.approx(-0.517, rel=TOUCH)
-    assert half.face[np.argmin(gaps)] in finite_element.plate.x_dofs[finite_element.plate.nodes_mm[1] > 100.0 - 1e-6]
+    elastic = finite_element.elastic
+    touch_mm = elastic.driven.first_touch(finite_element.first_touch_mm or 0.0)
+    touch = elastic.state(touch_mm, large_rotation=True)
+    gaps, _, _ = elastic.driven.gaps[0](touch.displacement_mm)
+    assert touch_mm == pytest.approx(-0.517, rel=TOUCH)
+    assert elastic.contact_points_mm[0][1, np.argmin(gaps)] > 100.0 - 1e-6
     # When the corners touch, the measuring points 0.3 mm below the corners are still apart.
-    assert 2.0 * half.measured_mm(touch.displacement_mm) == pytest.approx(0.016, abs=0.0015)
-    pressed = large_equilibrium(half, -0.57, touch, contact=True)
-    assert pressed.contact_n.sum() == pytest.approx(0.54, rel=CLOSED)
-    check_complementarity(pressed.contact_n, half.face_gap_mm(pressed.displacement_mm))
+    assert touch.pairs_mm["gap"] == pytest.approx(0.016, abs=0.0015)
+    check_contact(finite_element, -0.57, 0.54, large_rotation=True)
+
+
+def check_contact(model: DrawnGripper, input_mm: float, grip_n: float | None, *, large_rotation: bool = False) -> None:
+    driven = model.elastic.driven
+    found = driven.equilibrium(input_mm, large_rotation=large_rotation, contact=True)
+    (force_n,) = found.pressed_n
+    gap, slope, _ = driven.gaps[0](found.displacement if large_rotation else np.zeros(driven.unknowns))
+    check_complementarity(force_n, gap if large_rotation else gap + slope @ found.displacement)
+    assert grip_n is None or 0.5 * force_n.sum() == pytest.approx(grip_n, rel=CLOSED)
 
 
 def check_complementarity(force_n: np.ndarray, gap_mm: np.ndarray) -> None:
@@ -94,16 +101,14 @@ def check_complementarity(force_n: np.ndarray, gap_mm: np.ndarray) -> None:
 
 @pytest.mark.parametrize("input_mm", [-0.4, -0.52, -0.57, -0.7])
 def test_contact_is_complementary(finite_element: FiniteElementGripper, lumped: LumpedGripper, input_mm: float) -> None:
-    for half in (finite_element.half, lumped.half):
-        state = half.equilibrium(input_mm, contact=True)
-        check_complementarity(state.contact_n, half.face_gap_mm(state.displacement_mm))
+    for model in (finite_element, lumped):
+        check_contact(model, input_mm, None)
 
 
 def test_contact_force_and_measured_gap_when_pressed(finite_element: FiniteElementGripper) -> None:
-    half = finite_element.half
-    assert half.equilibrium(-0.57, contact=True).contact_n.sum() == pytest.approx(0.54, rel=CLOSED)
-    touch = half.equilibrium(half.first_touch_mm() or 0.0, contact=True)
-    assert 2.0 * half.measured_mm(touch.displacement_mm) == pytest.approx(0.016, abs=0.0015)
+    check_contact(finite_element, -0.57, 0.54)
+    touch = finite_element.elastic.state(finite_element.first_touch_mm or 0.0, contact=True)
+    assert touch.pairs_mm["gap"] == pytest.approx(0.016, abs=0.0015)
 
 
 def test_packaged_mesh_is_converged(gripper: Gripper, finite_element: FiniteElementGripper) -> None:

@@ -96,7 +96,7 @@ def test_the_sample_meshed_anew_is_at_the_limit(gripper: Gripper) -> None:
     mesh = mesh_outline(gripper, ElementSize(0.2, 2.5))
     model = FiniteElementGripper(gripper, mesh=mesh, width_effect=False)
     assert model.respond(np.array([1.0])).gap_mm - 4.0 == pytest.approx([7.7212], rel=2e-5)
-    assert model.half.equilibrium(1.0).force_n == pytest.approx(2.0014, rel=5e-4)
+    assert model.force_per_input_n_mm == pytest.approx(2.0014, rel=5e-4)
     assert model.peak_stress().mpa_per_mm == pytest.approx(19.07, rel=2e-3)
 
 

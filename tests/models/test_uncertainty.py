@@ -15,7 +15,6 @@ from fingervision.models.gripper_uncertainty import gripper_uncertainty
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.small_answer import small_answer
-from fingervision.models.steady_loads import midline_by_weight_mm
 from fingervision.models.uncertainty import propagate
 
 ENDS = np.array([-0.5, 1.5])
@@ -104,9 +103,7 @@ def test_sampled_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) 
     assert found.sampled
     # The midpoints of 60 intervals of equal probability of the normal distribution replace many draws.
     shifts = [
-        midline_by_weight_mm(
-            LumpedGripper(replace(gripper, hinge=replace(gripper.hinge, thickness_mm=1.0 + 0.1 * z))).half
-        )
+        LumpedGripper(replace(gripper, hinge=replace(gripper.hinge, thickness_mm=1.0 + 0.1 * z))).midline_by_weight_mm()
         for z in ndtri((np.arange(60) + 0.5) / 60).tolist()
     ]
     assert found.mean == pytest.approx(np.mean(shifts), rel=0.01)

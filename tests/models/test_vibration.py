@@ -6,14 +6,12 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping, paper_rate
-from fingervision.models.driven_body import DrivenBody
 from fingervision.models.generalized_alpha import integrate
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.modal_model import gripper_modes
 from fingervision.models.modal_response import modal_motion
-from fingervision.models.mode_shapes import ModesWanted, gripper_mode_shapes
+from fingervision.models.mode_shapes import ModesWanted, mode_shapes
 from fingervision.models.physics import Physics
-from fingervision.models.stepped_response import stepped_motion
+from fingervision.models.stepped_response import ReducedMotion
 
 # Damping ratio of equation (4) by dimensionless frequency, printed with two or three digits.
 PAPER_RATIOS = {1.0: 0.045, 2.0: 0.376, 5.0: 1.13, 10.0: 2.0, 100.0: 7.7, 1e3: 24.8, 6e3: 61.0, 1e5: 248.0}
@@ -45,8 +43,10 @@ def test_rayleigh_and_loss_factor() -> None:
     assert LossFactor(0.06).ratios(np.array([1.0])) == pytest.approx(0.03)
 
 
-def modal_gap_mm(body: DrivenBody, drive: DriveHistory, damping: Damping | None = None, modes: int = 3) -> np.ndarray:
-    return np.asarray(modal_motion(gripper_modes(body, modes), drive, damping).observed_mm["gap_mm"])
+def modal_gap_mm(
+    model: LumpedGripper, drive: DriveHistory, damping: Damping | None = None, modes: int = 3
+) -> np.ndarray:
+    return np.asarray(modal_motion(model.modal_model(modes), drive, damping).observed_mm["gap_mm"])
 
 
 def oscillator(steps: int, radius: float = 0.8, ratio: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -79,25 +79,26 @@ def test_energy_dies_away_and_never_grows() -> None:
     assert energy[-1] / energy[0] == pytest.approx(np.exp(-4.0 * np.pi * 0.025), rel=0.01)
 
 
-def test_stepped_frame_and_modes_vibrate_alike(lumped: LumpedGripper) -> None:
+def test_stepped_frame_and_modes_vibrate_alike(gripper: Gripper) -> None:
     """A ramp of 4 ms, then free vibration with held drive: modes against time steps in the deformed shape."""
-    half = lumped.half
+    bars = LumpedGripper(gripper, bars_alone=True)
+    frame = bars.elastic.driven
     step_s, rise_s = 5e-5, 4e-3
     time_s = np.arange(241) * step_s
     history = 0.01 * np.minimum(time_s / rise_s, 1.0)
     drive = DriveHistory(time_s, history)
-    modal = modal_gap_mm(half, drive, ModalDamping(1e-6), modes=8)
+    modal = modal_gap_mm(bars, drive, ModalDamping(1e-6), modes=8)
     motion = integrate(
-        half.mass_t,
-        csr_matrix(half.mass_t.shape),
-        half.tangent,
-        (np.zeros(half.unknowns), np.zeros(half.unknowns)),
-        (half.driven, history),
-        half.free,
+        frame.mass_t,
+        csr_matrix(frame.mass_t.shape),
+        frame.tangent,
+        (np.zeros(frame.unknowns), np.zeros(frame.unknowns)),
+        (np.flatnonzero(frame.by_input), history),
+        np.flatnonzero(np.diff(frame.motions.indptr)),
         step_s,
         high_frequency_radius=0.5,
     )
-    stepped = np.array([2.0 * half.measured_mm(row) for row in motion.displacement])
+    stepped = np.array([4.0 + bars.gap_change_mm(row) for row in motion.displacement])
     # The kinks excite modes beyond the eighth and beyond the step; they are small.
     assert np.abs(stepped - modal).max() < 0.05 * np.abs(modal - 4.0).max()
 
@@ -105,28 +106,28 @@ def test_stepped_frame_and_modes_vibrate_alike(lumped: LumpedGripper) -> None:
 def test_slow_drive_is_answered_statically(lumped: LumpedGripper) -> None:
     time_s = np.linspace(0.0, 60.0, 1501)
     inputs = np.interp(time_s, [0.0, 20.0, 40.0, 60.0], [0.0, 1.5, -0.4, 1.0])
-    gap = modal_gap_mm(lumped.half, DriveHistory(time_s, inputs))
+    gap = modal_gap_mm(lumped, DriveHistory(time_s, inputs))
     assert gap == pytest.approx(lumped.respond(inputs).gap_mm, abs=1e-3)
 
 
 def test_struck_gripper_rings_down_at_its_damping(lumped: LumpedGripper) -> None:
-    half: DrivenBody = lumped.half
     frequency = lumped.modes_hz(drive_held=True)[0]
     time_s = np.concatenate([[0.0, 1e-3], 1e-3 + np.arange(1, 41) / frequency / np.sqrt(1 - 0.025**2)])
     inputs = np.minimum(time_s / 1e-3, 1.0) * 0.1
-    ring = modal_gap_mm(half, DriveHistory(time_s, inputs), ModalDamping(0.025), modes=1)[2:] - 4.0
+    ring = modal_gap_mm(lumped, DriveHistory(time_s, inputs), ModalDamping(0.025), modes=1)[2:] - 4.0
     ring -= lumped.respond(np.array([0.1])).gap_mm[0] - 4.0
     assert np.log(ring[:-1] / ring[1:]) == pytest.approx(2 * np.pi * 0.025 / np.sqrt(1 - 0.025**2), rel=1e-3)
 
 
 @pytest.mark.slow
 def test_fingers_driven_together_do_not_pass_through(gripper: Gripper) -> None:
-    half = LumpedGripper(gripper, bars_alone=True).half  # takes a third of the time of a meshed finger
     time_s = np.linspace(0.0, 0.06, 121)
     drive = DriveHistory(time_s, np.interp(time_s, [0.0, 0.02, 0.06], [0.0, -0.57, -0.57]))
     law = ModalDamping(0.1)
-    gap, force = stepped_motion(half, drive, Physics(large_rotation=True, contact=True), law, 1e-4)
-    through, _ = stepped_motion(half, drive, Physics(large_rotation=True), law, 1e-4)
+    (gap, force), (through, _) = (
+        ReducedMotion(LumpedGripper(gripper, Physics(large_rotation=True, contact=contact))).over(drive, law, 1e-4)
+        for contact in (True, False)
+    )
     # With a penalty of 20 times the finger's stiffness of 2.6 N/mm, each finger penetrates by its grip divided by 52
     # N/mm.
     assert gap.min() > -0.03
@@ -135,7 +136,7 @@ def test_fingers_driven_together_do_not_pass_through(gripper: Gripper) -> None:
 
 
 def test_a_film_s_mirrored_halves_meet_and_do_not_pass_through_each_other(lumped: LumpedGripper) -> None:
-    shapes = gripper_mode_shapes(lumped, ModesWanted(2))
+    shapes = mode_shapes(lumped.elastic, ModesWanted(2))
     for shape in shapes:
         right = np.arange(len(shape.lines_mm) // 2)
         closed = (shape.lines_mm - shape.swing * shape.shift_mm)[right, :, 0]

@@ -8,7 +8,6 @@ from fingervision.domain.effect import History, Values
 from fingervision.domain.model import PhysicalLaw
 from fingervision.domain.response import Response
 from fingervision.models.drawn_answer import DrawnAnswer
-from fingervision.models.static_answer import gap_per_input
 
 EFFECT = "finger_contact"
 _DEPTHS = 60
@@ -27,17 +26,17 @@ def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
     fraction of the closing (`remaining_slope`). If the faces are soft, the measuring point moves further, and
     proportionally less force is needed.
     """
-    body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
-    touch_mm = body.first_touch_mm()
+    model, (lowest_mm, highest_mm) = drawn.model, drawn.input_range_mm
+    touch_mm = model.first_touch_mm
     if touch_mm is None or not lowest_mm < touch_mm < highest_mm:
         return None
-    slope, floor_mm = gap_per_input(body), 2.0 * body.measured_rest_mm + gap_per_input(body) * touch_mm
+    slope, floor_mm = model.gap_per_input, model.rest_gap_mm + model.gap_per_input * touch_mm
     inputs = np.linspace(touch_mm, lowest_mm, _DEPTHS)[1:]
-    states = [body.equilibrium(float(value), contact=True) for value in inputs]
-    free_mm = 2.0 * body.measured_rest_mm + slope * inputs
+    states = [model.elastic.driven.equilibrium(float(value), contact=True) for value in inputs]
+    free_mm = model.rest_gap_mm + slope * inputs
     missing = np.concatenate([[0.0], floor_mm - free_mm])
-    held = np.concatenate([[0.0], [2.0 * body.measured_mm(s.displacement_mm) for s in states] - free_mm])
-    free_n = body.equilibrium(1.0).force_n * inputs
+    held = np.concatenate([[0.0], [model.gap_change_mm(s.displacement) for s in states] - slope * inputs])
+    free_n = model.force_per_input_n_mm * inputs
     extra_n = np.concatenate([[0.0], [s.force_n for s in states] - free_n])
     rigid_slope = 1.0 - held[1] / missing[1]
     beyond = (
@@ -55,7 +54,7 @@ def law(drawn: DrawnAnswer) -> PhysicalLaw | None:
             return moved
         return replace(moved, force_n=moved.force_n + share * (np.interp(deep, missing, extra_n) + beyond[1] * past))
 
-    near_mm = _AS_DRAWN * 2.0 * body.measured_rest_mm
+    near_mm = _AS_DRAWN * model.rest_gap_mm
     return PhysicalLaw(
         act,
         foretold={"floor_mm": (floor_mm - near_mm, floor_mm + near_mm), "remaining_slope": (0.0, rigid_slope + _RIGID)},

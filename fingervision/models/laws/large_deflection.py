@@ -12,8 +12,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.model import PhysicalLaw
 from fingervision.domain.response import Response
 from fingervision.models.drawn_answer import DrawnAnswer
-from fingervision.models.large_rotation import large_equilibrium
-from fingervision.models.static_answer import gap_per_input
+from fingervision.models.elastic_mechanism import pair_distances_mm
 
 Array = NDArray[np.float64]
 
@@ -76,18 +75,18 @@ def _arc(opening_mm: Array, reach_mm: float, cross: float) -> Array:
 
 def _equilibria(drawn: DrawnAnswer) -> tuple[Array, Array, Array]:
     """Openings without and with large rotation, and the ratio of the forces (with over without), over the inputs."""
-    body, (lowest_mm, highest_mm) = drawn.body, drawn.input_range_mm
-    paths = []
+    model, (lowest_mm, highest_mm) = drawn.model, drawn.input_range_mm
+    elastic, paths = model.elastic, [(0.0, model.rest_gap_mm, 0.0)]
     for end_mm, count in ((lowest_mm, _BELOW), (highest_mm, _ABOVE)):
-        state = body.at_rest()
         for value in np.linspace(0.0, end_mm, count + 1)[1:].tolist():
-            state = large_equilibrium(body, value, state, contact=False)
-            paths.append((value, body.measured_mm(state.displacement_mm), state.force_n))
-    at, right, force = np.array(sorted([*paths, (0.0, body.measured_rest_mm, 0.0)])).T
+            found = elastic.driven.equilibrium(value, large_rotation=True)
+            probes = elastic.probes_mm(found.displacement, large=True)
+            paths.append((value, pair_distances_mm(elastic.mechanism, probes, large=True)["gap"], found.force_n))
+    at, gap, force = np.array(sorted(paths)).T
     inputs = np.linspace(lowest_mm, highest_mm, _ROWS)
-    opening_mm = gap_per_input(body) * inputs
-    bent_mm = 2.0 * (CubicSpline(at, right)(inputs) - body.measured_rest_mm)
-    stiffness = body.equilibrium(1.0).force_n
+    opening_mm = model.gap_per_input * inputs
+    bent_mm = CubicSpline(at, gap)(inputs) - model.rest_gap_mm
+    stiffness = model.force_per_input_n_mm
     moving = at != 0.0
     # The ratio is smooth through zero input, where both forces are zero and cannot be divided.
     ratio = CubicSpline(at[moving], force[moving] / (stiffness * at[moving]))(inputs)
