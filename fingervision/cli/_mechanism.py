@@ -74,7 +74,7 @@ def write_states(states: Sequence[MechanismState], out: Path) -> None:
 
 def _table(columns: dict[str, list[float]], path: Path) -> None:
     rows = zip(*columns.values(), strict=True)
-    lines = [",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+    lines = [",".join(columns), *(",".join("" if np.isnan(value) else f"{value:.9g}" for value in row) for row in rows)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -84,10 +84,13 @@ def draw_deformed(model: MechanismPlate, state: MechanismState, path: Path, *, l
     moved: NDArray[np.float64] = state.displacement_mm
     stress = plate.at_corners(plate.von_mises_mpa(moved, large=large))
     figure, axes = framed(*extent_mm(plate, moved))
-    colours = draw_body(axes, plate, moved, stress, max(state.stress_mpa, 1e-9))
+    stated = np.isfinite(state.stress_mpa)
+    said = f"largest stress in a flexure {state.stress_mpa:.3g} MPa" if stated else "largest stress not stated"
+    largest = state.stress_mpa if stated else float(np.percentile(stress, 99.0))
+    colours = draw_body(axes, plate, moved, stress, max(largest, 1e-9))
     axes.set_title(
         f"{model.mechanism.name}: input {state.input_mm:.3g} mm, to scale, force {state.force_n:.3g} N\n"
-        f"largest stress in a flexure {state.stress_mpa:.3g} MPa (yield {model.mechanism.material.yield_mpa:g} MPa)",
+        f"{said} (yield {model.mechanism.material.yield_mpa:g} MPa)",
         fontsize="medium",
     )
     figure.colorbar(colours, ax=axes, label="von Mises stress / MPa", shrink=0.8)
@@ -148,6 +151,8 @@ def _lengths(mechanism: Mechanism, rows: Sequence[MechanismState]) -> dict[str, 
 _KINDS = ("finite_element", "lumped")
 _ROWS = 21
 _MOST_ROWS = 41
+_OF_SIZE = 0.02
+"""Input that takes the place of the one at yield where no stress is stated, as a share of the drawing's size."""
 _OF_YIELD = 0.5
 """Range of inputs without a drive table, in both directions, as a fraction of the input at which the flexures yield."""
 
@@ -187,7 +192,7 @@ def predict(
         )
     models, table = _figures(path, mechanism, _KINDS if kind == "all" else (kind,))
     chief = next(iter(models))
-    at_yield_mm = table[chief]["input_at_yield_mm"]
+    at_yield_mm = table[chief].get("input_at_yield_mm", _OF_SIZE * mechanism.region.size_mm)
     driven = None if drive is None else np.unique(read_drive(drive, columns).input_mm)
     touching = models[chief].touch_input_mm().values() if contact and driven is not None else ()
     inputs = _inputs_mm(driven, at_yield_mm, touching, is_curved=large_rotation or contact)
@@ -207,6 +212,8 @@ def predict(
         add_endurance(mechanism, rows, table[name])
     write_figures(table, out / "models.csv")
     print_figures(mechanism.name, table, as_json=as_json)
+    for driven_face in mechanism.drives if not as_json else ():
+        click.echo(driven_face.words)
     if drawing.estimates:
         spread = mechanism_uncertainty(drawing.mechanism, drawing.estimates)
         write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from math import copysign
+from math import copysign, isfinite
 
 import click
 
@@ -35,6 +35,13 @@ def warn(
     contact: bool,
 ) -> None:  # fmt: skip
     """Warn of yielding, of faces that penetrate each other, and of differences between the kinds of model."""
+    if (corner := getattr(model, "unstated_stress_at_mm", None)) is not None:
+        click.echo(
+            f"Warning: the stress is not stated, because the outline has a re-entrant corner without a radius at "
+            f"({corner[0]:.4g}, {corner[1]:.4g}) mm, where it has no limit: round the corner, or draw the thin strip "
+            "there as a [[flexure]].",
+            err=True,
+        )
     worst = max(states, key=lambda state: state.stress_mpa)
     if worst.stress_mpa > mechanism.material.yield_mpa:
         at_yield_mm = next(iter(table.values()))["input_at_yield_mm"]
@@ -93,6 +100,8 @@ def add_endurance(mechanism: Mechanism, states: Sequence[MechanismState], figure
 
 
 def _life(mechanism: Mechanism, states: Sequence[MechanismState]) -> Endurance | None:
+    if not isfinite(states[0].stress_mpa):
+        return None
     ends = sorted(copysign(state.stress_mpa, state.input_mm) for state in (states[0], states[-1]))
     return endurance(mechanism.material, ends[0], ends[1])
 

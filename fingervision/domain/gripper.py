@@ -55,7 +55,7 @@ class Material:
 
     name: Annotated[str, Field("name of the material")]
     youngs_modulus_mpa: Annotated[float, Field("Young's modulus", "MPa", low=1e-3, high=1e13, hint=CHECK_UNIT)]
-    poisson_ratio: Annotated[float, Field("Poisson's ratio", above=0.0, below=0.5)]
+    poisson_ratio: Annotated[float, Field("Poisson's ratio", low=0.0, below=0.5)]
     density_kg_m3: Annotated[
         float, Field("density", "kg/m3", low=30.0, high=25000.0, hint="is it in g/cm3? Multiply it by 1000")
     ]

@@ -14,7 +14,7 @@ from fingervision.models.condensed_bodies import CondensedBody, OwnModes, conden
 from fingervision.models.corotational_body import CorotationalBody, turned_axes
 from fingervision.models.flexure_span import FlexureSpan
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_faces import driven_components, nodes_on, supports_of, turns_with
+from fingervision.models.mechanism_faces import driven_components, moves_in_the_mean, nodes_on, supports_of
 from fingervision.models.plane_stress import PlaneStressPlate
 
 Array = NDArray[np.float64]
@@ -152,10 +152,10 @@ class _Frames:
         for drive, nodes in zip(mechanism.drives, supports.driven, strict=True):
             kept = driven_components(drive)
             own: dict[int, float] = {}
-            in_the_mean = len(kept) == 1 and turns_with(self.plate, nodes, kept[0])
+            in_the_mean = moves_in_the_mean(self.plate, nodes, drive)
             for at, turns in self.face(nodes, () if in_the_mean else kept):
                 own |= {at + "xy".index(c): drive.direction["xy".index(c)] for c in kept}
-                own |= {at + 2: 0.0} if turns else {}
+                own |= {at + 2: 0.0} if turns or drive.turns == "held" else {}
             self.by_drive.append(own)
         for nodes, component in supports.slides:
             for at, turns in self.face(nodes, (component,)):

@@ -1,6 +1,7 @@
 """Model for the diagnosis of a mechanism whose drawing names its hinges, links and bodies."""
 
 from functools import cached_property
+from math import isfinite
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -65,7 +66,9 @@ class MechanismModelOfGap:
             raise UsageError(f"The kind of model must be finite_element, lumped or stiffness_matrix, but is {kind}.")
         self._model = model
         state = model.state(1.0)
-        reach = mechanism.material.yield_mpa / state.stress_mpa
+        # Without a stress, the range is a hundredth of the size, as for a gripper whose fingers never touch.
+        limit = 0.01 * mechanism.region.size_mm
+        reach = mechanism.material.yield_mpa / state.stress_mpa if isfinite(state.stress_mpa) else limit
         touches = [at for at in model.touch_input_mm().values() if abs(at) < reach]
         self.input_range_mm = (
             max([-reach, *(at for at in touches if at < 0.0)]),

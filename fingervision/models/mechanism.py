@@ -1,6 +1,8 @@
 """Description of a planar flexure mechanism, as given by its drawing: bodies, flexures, supports, drive, probes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import hypot, pi
 from typing import Literal
 
@@ -9,15 +11,21 @@ import numpy as np
 from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
-from fingervision.models.planar_region import PlanarRegion
-from fingervision.models.plane_shapes import Shape
+from fingervision.models.outline_curves import crossings
+from fingervision.models.planar_region import Loop, PlanarRegion
+from fingervision.models.plane_shapes import Shape, box
 from fingervision.models.width_effect import force_uncertainty
 
 _SIZES_MM = (0.3, 5000.0)
 """Sizes of flexure mechanisms, from etched silicon to large machines: drawings in metres or micrometres lie outside."""
+_MOST_NAMED = 3
+"""Pieces of a drawing that a message names."""
 _SAME_AREA = 1e-2
 """Relative difference below which two areas count as equal: areas of regions with arcs are computed from polygons, with
 an error of 1e-3."""
+
+
+Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +51,28 @@ class Drive:
         direction along x or y).
     per_input : float
         Motion of the face along `direction` per 1 mm of input; 0 for a drive that stands still.
+    turns : str
+        Rotation of the face: `free` for a rod or a pin, which moves the face in the mean, with a force spread evenly
+        over it, while the face may turn and bend; `held` for a clamp or a flat plate, with which every point of the
+        face moves alike.
     """
 
     face: Face
     direction: PointMm
     across: Literal["held", "free"]
     per_input: float = 1.0
+    turns: Literal["held", "free"] = "held"
+
+    @property
+    def words(self) -> str:
+        """Sentence on what the driven face may do."""
+        how = {
+            ("free", "free"): "is pushed as by a rod: it moves by the input in the mean, and may slide, turn and bend",
+            ("free", "held"): "is pushed as by a flat plate: every point moves by the input, and may slide",
+            ("held", "free"): "is moved as by a pin: it moves by the input in the mean, and may turn and bend",
+            ("held", "held"): "is clamped to a stage: every point moves by the input, and cannot slide or turn",
+        }[self.across, self.turns]
+        return f'The driven face {self.face.name} {how} (across = "{self.across}", turns = "{self.turns}").'
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +157,7 @@ class Mechanism:
 
         Points on the symmetry axis then cannot move along the axis.
         """
-        return replace(self, slides=tuple((face, "y") for face, _ in self.slides), drives=(), contacts=())
+        return replace(self, slides=tuple((face, "y") for face, _ in self.slides), drives=())
 
     @property
     def width_error(self) -> float:
@@ -147,8 +171,24 @@ class Mechanism:
         steps = (*self.bodies, *(step for flexure in self.flexures for step in flexure.steps()))
         faces = [*self.fixed, *(face for face, _ in self.slides), *(drive.face for drive in self.drives)]
         faces += [face for contact in self.contacts for face in (contact.face, contact.other) if face is not None]
-        marks = tuple((x, y) for face in faces for x in face.box_mm[:2] for y in face.box_mm[2:])
-        return PlanarRegion(steps, marks)
+        return PlanarRegion(steps, _ends_of(steps, tuple(face.box_mm for face in faces)))
+
+
+@lru_cache(maxsize=64)
+def _ends_of(steps: tuple[tuple[bool, Shape], ...], boxes: tuple[Box, ...]) -> tuple[PointMm, ...]:
+    """Points at which faces begin and end: the corners of their boxes, and where their sides cross the shapes.
+
+    A node stands at each of these, so that a face does not depend on where the mesh has its nodes.
+    """
+    marks = [(x, y) for box_mm in boxes for x in box_mm[:2] for y in box_mm[2:]]
+    curves = [curve for _, shape in steps for curve in shape.curves()]
+    for x0, x1, y0, y1 in boxes:
+        if x0 == x1 or y0 == y1:
+            continue
+        for side in box(x0, x1, y0, y1).curves():
+            points = [curve.at(np.array(crossings(curve, side))) for curve in curves]
+            marks += [(float(x), float(y)) for x, y in np.concatenate(points, axis=1).T]
+    return tuple(marks)
 
 
 def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
@@ -161,20 +201,21 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         outside.
     """
     name = mechanism.name
-    try:
-        outer = sum(loop.area_mm2 > 0.0 for loop in region.loops)
-    except FingervisionError as error:
-        raise DataError(f"In {name}: {error}") from error
-    if outer != 1:
-        raise DataError(
-            f"The bodies of {name} must form one connected piece, but form {outer}; let bodies and flexures "
-            "overlap, and let no cut separate them."
-        )
     size = region.size_mm
     if not _SIZES_MM[0] <= size <= _SIZES_MM[1]:
+        unit = "metres? Multiply every length by 1000" if size < _SIZES_MM[0] else "micrometres? Divide them by 1000"
         raise DataError(
-            f"{name} must be {_SIZES_MM[0]:g} to {_SIZES_MM[1]:g} mm large, but is {size:.3g} mm; check whether all "
-            "lengths are millimetres."
+            f"{name} must be {_SIZES_MM[0]:g} to {_SIZES_MM[1]:g} mm large, but its bodies are {size:.3g} mm across; "
+            f"are its lengths {unit}."
+        )
+    try:
+        outer = [loop for loop in region.loops if loop.area_mm2 > 0.0]
+    except FingervisionError as error:
+        raise DataError(f"In {name}: {error}") from error
+    if len(outer) != 1:
+        raise DataError(
+            f"The bodies of {name} must form one connected piece, but form {len(outer)}: {_pieces(mechanism, outer)}; "
+            "let bodies and flexures overlap, and let no cut separate them."
         )
     uncut = PlanarRegion(mechanism.bodies)
     for flexure in mechanism.flexures:
@@ -213,6 +254,23 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
     for face in (*mechanism.fixed, *(drive.face for drive in mechanism.drives)):
         if hypot(*face.box_mm) > 1e6:
             raise DataError(f"face {face.name} of {name} must have a box_mm with finite limits.")
+
+
+def _pieces(mechanism: Mechanism, outer: Sequence[Loop]) -> str:
+    """Where each piece of a drawing lies, and the names of the bodies in it."""
+    found = []
+    names = [*mechanism.body_names, *[""] * len(mechanism.bodies)]
+    for loop in outer[:_MOST_NAMED]:
+        points = np.concatenate([curve.at(np.array([curve.t0, curve.t1])) for curve in loop.curves], axis=1)
+        (x0, y0), (x1, y1) = points.min(axis=1), points.max(axis=1)
+        inside = dict.fromkeys(
+            name
+            for (added, shape), name in zip(mechanism.bodies, names, strict=False)
+            if added and name and shape.holds(points).any()
+        )
+        of = f" ({', '.join(inside)})" if inside else ""
+        found.append(f"one at x {x0:.4g} to {x1:.4g}, y {y0:.4g} to {y1:.4g} mm{of}")
+    return ", ".join(found) + (", ..." if len(outer) > _MOST_NAMED else "")
 
 
 def _is_hole(area_mm2: float, flexure: Flexure) -> bool:

@@ -95,6 +95,19 @@ class MechanismChain:
                 found.add(number)
         return found
 
+    def _middle_mm(self, face: Face) -> Array:
+        """Middle of the part of the outline in a face's box, at which its force acts."""
+        x0, x1, y0, y1 = face.box_mm
+        near, moment, length = _ON * self._size_mm, np.zeros(2), 0.0
+        for curve in (curve for loop in self._bodies for curve in loop.curves):
+            points = curve.at(np.linspace(curve.t0, curve.t1, _SAMPLES))
+            x, y = points
+            inside = (x >= x0 - near) & (x <= x1 + near) & (y >= y0 - near) & (y <= y1 + near)
+            steps = np.hypot(*np.diff(points, axis=1)) * (inside[1:] & inside[:-1])
+            moment += 0.5 * (points[:, 1:] + points[:, :-1]) @ steps
+            length += float(steps.sum())
+        return moment / length if length > 0.0 else np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
+
     def _only(self, face: Face) -> int:
         bodies = self._touching(face)
         if len(bodies) != 1:
@@ -135,7 +148,10 @@ class MechanismChain:
         """Find the motions (x, y, rotation) fixed by drives and guides, and reaction loads per 1 mm of each drive."""
         mechanism = self.mechanism
         drives = mechanism.drives
-        held = [self._held_by(drive.face, driven_components(drive)) for drive in drives]
+        held = [
+            self._held_by(drive.face, driven_components(drive)) - ({2} if drive.turns == "free" else set())
+            for drive in drives
+        ]
         for face, component in mechanism.slides:
             touching = self._touching(face)
             if len(touching) != 1 or not touching <= set(bodies):
@@ -144,8 +160,7 @@ class MechanismChain:
                     f"{mechanism.name} is held at {face.name} too; take --kind lumped or finite_element."
                 )
             held[bodies.index(touching.pop())] |= self._held_by(face, (component,))
-        boxes = np.array([drive.face.box_mm for drive in drives])
-        self._at = 0.5 * (boxes[:, ::2] + boxes[:, 1::2])
+        self._at = np.array([self._middle_mm(drive.face) for drive in drives])
         kept = [3 * place + i for place, own in enumerate(held) for i in sorted(own)]
         motions = np.zeros((3 * len(drives), len(drives)))
         for place, drive in enumerate(drives):

@@ -53,19 +53,22 @@ def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
     return np.asarray(weights / weights.sum() if weights.sum() > 0.0 else np.full(nodes.size, 1.0 / nodes.size))
 
 
-def turns_with(plate: PlaneStressPlate, nodes: Indices, component: str) -> bool:
-    """Whether a face is parallel to x or y (`component`), so that prescribing that component lets it rotate.
+def moves_in_the_mean(plate: PlaneStressPlate, nodes: Indices, drive: Drive) -> bool:
+    """Whether a drive prescribes the mean motion of its face, not the motion of every node.
 
-    For a face parallel to the component, the drive prescribes only the mean of the component over the face. A face at
-    another angle could rotate only by stretching if the component were prescribed at every node.
+    A face that may turn moves in the mean. So does a face that may slide and is parallel to its drive, because
+    prescribing the motion along it at every node would let it rotate by stretching alone; `turns` then decides whether
+    its mean rotation is free.
     """
+    components = driven_components(drive)
     places = plate.nodes_mm[:, nodes]
     spread = np.ptp(places, axis=1)
-    return bool(spread[1 if component == "x" else 0] < _LEVER * np.hypot(*spread))
+    parallel = len(components) == 1 and spread["yx".index(components[0])] < _LEVER * np.hypot(*spread)
+    return bool(drive.turns == "free" or parallel)
 
 
 def driven_components(drive: Drive) -> tuple[str, ...]:
-    """Components prescribed at every node of a driven face: x and y if the face is guided, else that of the drive."""
+    """Components that a drive prescribes: x and y if the face is guided, else that of the drive."""
     if drive.across == "held":
         return "x", "y"
     return ("x",) if drive.direction[0] != 0.0 else ("y",)

@@ -1,5 +1,7 @@
 """Characteristic numbers of a mechanism that is described by its bodies, for any kind of model."""
 
+from math import isfinite
+
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_loads import operating_figures_of
@@ -25,11 +27,12 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
         Numbers by name, with the unit at the end of the name.
     """
     unit, rest = model.state(1.0), model.state(0.0)
-    figures = {
-        "input_stiffness_n_mm": model.stiffness_n_mm,
-        "peak_stress_mpa_per_mm": unit.stress_mpa,
-        "input_at_yield_mm": model.mechanism.material.yield_mpa / unit.stress_mpa,
-    }
+    figures = {"input_stiffness_n_mm": model.stiffness_n_mm}
+    if isfinite(unit.stress_mpa):
+        figures |= {
+            "peak_stress_mpa_per_mm": unit.stress_mpa,
+            "input_at_yield_mm": model.mechanism.material.yield_mpa / unit.stress_mpa,
+        }
     for name, (x, y) in unit.probes_mm.items():
         figures[f"{name}: x per input [mm/mm]"] = x
         figures[f"{name}: y per input [mm/mm]"] = y
@@ -45,10 +48,9 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     for held, label in ((False, "drive_free"), (True, "drive_held")):
         for place, value in enumerate(model.modes_hz(drive_held=held), 1):
             figures[f"mode_{place}_{label}_hz"] = value
-    errors = {
-        "model_error_force_percent": 100.0 * model.force_error,
-        "model_error_stress_percent": 100.0 * model.stress_error,
-    }
+    errors = {"model_error_force_percent": 100.0 * model.force_error}
+    if isfinite(unit.stress_mpa):
+        errors["model_error_stress_percent"] = 100.0 * model.stress_error
     if isinstance(model, MechanismPlate):
         figures |= operating_figures_of(model)
         across = out_of_plane(model.mechanism)

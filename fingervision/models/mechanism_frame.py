@@ -329,7 +329,7 @@ class MechanismFrame(ElasticMechanism):
         x, y, angle = (moved[3 * node + way] for way in range(3))
         arm = np.array(point) - self.frame.nodes_mm[node]
         if large:
-            return np.array([x, y]) + (turned_axes(float(angle)) - np.eye(2)) @ arm
+            return np.asarray(np.array([x, y]) + (turned_axes(float(angle)) - np.eye(2)) @ arm)
         return np.stack([x - angle * arm[1], y + angle * arm[0]])
 
     def _section_at(self, point: PointMm) -> int | None:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property, partial
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,13 @@ from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStres
 from fingervision.models.mechanism import Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism
-from fingervision.models.mechanism_faces import driven_components, mean_weights, per_input_of, supports_of, turns_with
+from fingervision.models.mechanism_faces import (
+    driven_components,
+    mean_weights,
+    moves_in_the_mean,
+    per_input_of,
+    supports_of,
+)
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.rigid_motion import BodyPose
@@ -70,6 +77,8 @@ class MechanismPlate(ElasticMechanism):
         middles = self.mesh.nodes_mm[:, self.mesh.triangles[:3]].mean(axis=1)
         inside = [zone.holds(middles) for zone in zones] or [np.ones(middles.shape[1], dtype=bool)]
         self._in_flexure = np.any(inside, axis=0) & ~self._beside_sharp_corners(region, middles)
+        corners = [] if mechanism.flexures else sharp_corners_mm(region)
+        self.unstated_stress_at_mm = (float(corners[0][0]), float(corners[0][1])) if corners else None
         self._support()
         if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures) and not self._wanders():
             # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
@@ -107,15 +116,21 @@ class MechanismPlate(ElasticMechanism):
         for column, (drive, nodes) in zip(self._by_drive.T, zip(mechanism.drives, supports.driven, strict=True),
                                           strict=True):  # fmt: skip
             driven = driven_components(drive)
-            if len(driven) == 1 and turns_with(plate, nodes, driven[0]):
-                # The face is parallel to the drive: the drive prescribes the mean motion of the face, through the
-                # unknown with the largest weight.
-                own, weights = dofs[driven[0]][nodes], mean_weights(plate, nodes)
-                chief = int(np.argmax(weights))
-                column[own[chief]] = drive.direction["xy".index(driven[0])] / weights[chief]
+            if moves_in_the_mean(plate, nodes, drive):
+                weights = mean_weights(plate, nodes)
+                wanted = [(c, weights, drive.direction["xy".index(c)]) for c in driven]
+                if drive.turns == "held":
+                    across = "yx"["xy".index(driven[0])]
+                    along = plate.nodes_mm["xy".index(driven[0]), nodes]
+                    wanted.append((across, weights * (along - weights @ along), 0.0))
                 motions = motions.tolil()
-                motions[own[chief], own] = -weights / weights[chief]
-                held.append(own[[chief]])
+                for component, row, value in wanted:
+                    # The drive prescribes a weighted sum, through the unknown with the largest weight that can move.
+                    own = dofs[component][nodes]
+                    chief = int(np.argmax(np.where(np.isin(own, np.concatenate([*held, [-1]])), 0.0, np.abs(row))))
+                    column[own[chief]] = value / row[chief]
+                    motions[own[chief], own] = -row / row[chief]
+                    held.append(own[[chief]])
                 continue
             for component, share in zip("xy", drive.direction, strict=True):
                 if component in driven:
@@ -217,7 +232,13 @@ class MechanismPlate(ElasticMechanism):
         return moved
 
     def peak_stress(self, moved: Array, *, large: bool = False) -> LargestStress:
-        """Largest von Mises stress in the flexures at given displacements."""
+        """Largest von Mises stress in the flexures at given displacements.
+
+        It is not a number in a drawing without flexures that has a re-entrant corner without a radius
+        (`unstated_stress_at_mm`): the stress has no limit there.
+        """
+        if self.unstated_stress_at_mm is not None:
+            return LargestStress(nan, self.unstated_stress_at_mm)
         stress = np.where(self._in_flexure, self.plate.von_mises_mpa(moved, large=large), 0.0)
         place = np.unravel_index(np.argmax(stress), stress.shape)
         x, y = self.plate.nodes_mm[:, self.plate.corner_triangles[place]]

@@ -116,7 +116,7 @@ class ReducedMotion:
     def _penalty_n_mm(self) -> Array:
         driven = self.model.elastic.driven
         slope = driven.gaps[0](np.zeros(driven.unknowns))[1]
-        return _PENALTY / np.einsum("ij,ji->i", slope.toarray(), driven.under_load(slope.toarray().T))
+        return np.asarray(_PENALTY / np.einsum("ij,ji->i", slope.toarray(), driven.under_load(slope.toarray().T)))
 
     def _internal(self, reduced: Array) -> tuple[csr_matrix, Array]:
         system, physics, columns = self._system, self.model.physics, self._columns

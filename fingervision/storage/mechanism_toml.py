@@ -156,9 +156,24 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
     )
     pairs = {name: ends for t in reader.sections(tables, "pair", least=0) for name, ends in [reader.pair(t, mechanism)]}
     mechanism.pairs.update(pairs)
+    _refuse_same_names(tables, reader)
     check_material(material, origin)
     check_mechanism(mechanism, mechanism.region)
     return mechanism
+
+
+def _refuse_same_names(tables: Mapping[str, Any], reader: "_Reader") -> None:
+    """Refuse two flexures, probes, pairs or contacts of one name: results by name would be those of one of them."""
+    for section in ("flexure", "probe", "pair", "contact"):
+        places: dict[str, int] = {}
+        for place, table in enumerate(reader.sections(tables, section, least=0), 1):
+            name = str(table.get("name", f"{section} {place}"))
+            if name in places:
+                raise DataError(
+                    f"Every [[{section}]] of {reader.origin} must have a name of its own, but numbers {places[name]} "
+                    f"and {place} are both called {name}; rename one of them."
+                )
+            places[name] = place
 
 
 class _Reader(DrawingReader):
@@ -274,7 +289,7 @@ class _Reader(DrawingReader):
         return found
 
     def drive(self, table: Mapping[str, Any], what: str) -> Drive:
-        self.known(table, ("name", "box_mm", "direction", "across", "per_input"), what)
+        self.known(table, ("name", "box_mm", "direction", "across", "turns", "per_input"), what)
         x, y = self.numbers(table, "direction", 2, what)
         across = table.get("across", "held")
         if hypot(x, y) == 0.0:
@@ -284,8 +299,14 @@ class _Reader(DrawingReader):
                 f"{what}.across in {self.origin} must be 'held', or 'free' if {what}.direction is along x or "
                 f"y, but is {across!r}."
             )
+        turns = table.get("turns", across)
+        if turns not in ("held", "free"):
+            raise DataError(
+                f"{what}.turns in {self.origin} must be 'free' (a rod or a pin: the face may turn) or 'held' (a clamp "
+                f"or a flat plate), but is {turns!r}."
+            )
         per_input = self.value({"per_input": 1.0, **table}, "per_input", what)
-        return Drive(self.face(table, what), (x / hypot(x, y), y / hypot(x, y)), across, per_input)
+        return Drive(self.face(table, what), (x / hypot(x, y), y / hypot(x, y)), across, per_input, turns)
 
     def probe(self, table: Mapping[str, Any]) -> tuple[str, tuple[float, float]]:
         name = str(table.get("name", ""))

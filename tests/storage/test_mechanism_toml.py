@@ -4,11 +4,14 @@ import json
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from fingervision.cli.model import command
 from fingervision.domain.errors import DataError, FingervisionError, ModelError, UsageError
+from fingervision.models.mechanism_figures import mechanism_figures
+from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.storage.arithmetic import number
 from fingervision.storage.mechanism_toml import is_mechanism, mechanism_from_tables, read_mechanism
@@ -32,6 +35,7 @@ WRONG = [
     ("t = 0.4", "t = 0.0", "thickness_mm"),
     ("youngs_modulus_mpa = 210000.0", "youngs_modulus_mpa = 210.0", "GPa"),
     ("poisson_ratio = 0.3", "poisson_ratio = 0.5", "poisson_ratio"),
+    ("poisson_ratio = 0.3", "poisson_ratio = -0.1", "poisson_ratio"),
     (
         'box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "leaf", "leaf + block"]',
         "box_mm = [100, 120, 100, 120]",
@@ -51,6 +55,13 @@ WRONG = [
     ('of = ["ground", "stage"]', 'of = ["ground", "moon"]', "two of the probes"),
     ("[[fixed]]", "[[fixt]]", "did you mean fixed?"),
     ('name = "ground"\nbox_mm', 'name = "ground"\nwide = 3\nbox_mm', "unknown key, wide"),
+    ('turns = "held"', 'turns = "maybe"', "drive.turns"),
+    ('name = "right"', 'name = "left"', "numbers 1 and 2 are both called left"),
+    (
+        'box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "leaf", "leaf + block"]',
+        "box_mm = [100, 120, 100, 120]",
+        "one at x 100 to 120, y 100 to 120 mm (stage)",
+    ),
 ]
 UNHELD = [
     ('"-block", "-block"]\n\n[drive]', "100.0, 101.0]\n\n[drive]", "must hold a part of the outline"),
@@ -107,6 +118,34 @@ direction = [1, 0]
     assert "\n" not in str(refused.value)
     open_cuts = post.replace("box_mm = [0, 10, 0, 30]", "box_mm = [3.8, 6.2, 0, 30]")
     assert mechanism_from_tables(tomllib.loads(open_cuts), "post.toml").flexures
+
+
+def test_a_drawing_in_metres_is_asked_about() -> None:
+    drawn = tomllib.loads(STAGE)
+    drawn["lengths"] = {name: value * 1e-3 for name, value in drawn["lengths"].items()}
+    drawn["flexure"] = []
+    for body in drawn["body"]:
+        body["box_mm"] = ["-apart", "apart", *body["box_mm"][2:]]
+    with pytest.raises(DataError, match="are its lengths metres"):
+        mechanism_from_tables(drawn, "m.toml")
+
+
+def test_a_material_that_does_not_contract_is_drawn() -> None:
+    cork = mechanism_from_tables(tomllib.loads(STAGE.replace("poisson_ratio = 0.3", "poisson_ratio = 0.0")), "m.toml")
+    steel = mechanism_from_tables(tomllib.loads(STAGE), "m.toml")
+    soft, stiff = (MechanismFrame(drawn).stiffness_n_mm for drawn in (cork, steel))
+    assert soft == pytest.approx(MechanismPlate(cork).stiffness_n_mm, rel=0.005)
+    assert soft < stiff  # without the restraint by its width
+
+
+def test_a_sharp_corner_without_a_flexure_states_no_stress() -> None:
+    drawn = tomllib.loads(STAGE)
+    drawn["body"] += [{"bar_mm": [*(f"{side} * apart / 2", "-1", f"{side} * apart / 2", "leaf + 1")], "width_mm": "t"}
+                      for side in ("-1", "1")]  # fmt: skip
+    drawn["flexure"] = []
+    plate = MechanismPlate(mechanism_from_tables(drawn, "m.toml"))
+    assert np.isnan(plate.state(1.0).stress_mpa)
+    assert not any("stress" in name or "yield" in name for name in mechanism_figures(plate))
 
 
 def test_a_mechanism_that_nothing_holds_is_refused() -> None:

@@ -1,0 +1,122 @@
+"""What a driven face may do, against structured quadrilaterals of second order that share nothing with the models."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import skfem
+from scipy.sparse.linalg import spsolve
+from skfem.helpers import ddot, eye, sym_grad, trace
+
+from fingervision.domain.errors import DataError
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_chain import MechanismChain
+from fingervision.models.mechanism_frame import MechanismFrame
+from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.storage.mechanism_toml import read_mechanism
+
+E, NU, PLATE_MM = 1000.0, 0.3, 2.0
+FORCE = 0.007
+"""Of plane stress at a leaf's sharp roots, where the quadrilaterals are 0.25 mm large."""
+LEVER = """
+plate_mm = 2.0
+material = {{ name = "m", youngs_modulus_mpa = 1000.0, poisson_ratio = 0.3, density_kg_m3 = 1000.0, yield_mpa = 40.0 }}
+[[body]]
+name = "foot"
+box_mm = [0, 10, 0, 10]
+[[body]]
+name = "lever"
+box_mm = [20, 60, 0, 10]
+[[flexure]]
+name = "leaf"
+kind = "leaf"
+at_mm = [15, 5]
+axis_deg = 0
+thickness_mm = 1.0
+half_length_mm = 6.0
+[[fixed]]
+box_mm = [0, 0, 0, 10]
+[drive]
+box_mm = [{box}]
+direction = [0, 1]
+{how}
+"""
+
+
+def lever(folder: Path, box: str, how: str) -> Mechanism:
+    path = folder / "mechanism.toml"
+    path.write_text(LEVER.format(box=box, how=how))
+    return read_mechanism(path)
+
+
+def quadrilaterals_n_mm(x0: float, x1: float, *, held: bool) -> float:
+    """Force per mm at the lever's top face from x0 to x1: under an even load, or with every node moved alike."""
+    x = np.unique(np.concatenate([np.arange(0.0, 61.0), np.arange(9.0, 21.1, 0.25), [x0, x1]]))
+    y = np.unique(np.concatenate([np.arange(0.0, 11.0), np.arange(4.0, 6.1, 0.25)]))
+    mesh = skfem.MeshQuad.init_tensor(x, y)
+    middle = mesh.p[:, mesh.t].mean(axis=1)
+    mesh = mesh.restrict(np.flatnonzero((middle[0] < 10) | (middle[0] > 20) | (np.abs(middle[1] - 5) < 0.5)))
+    element = skfem.ElementVector(skfem.ElementQuad2())
+    basis = skfem.Basis(mesh, element, intorder=4)
+
+    @skfem.BilinearForm
+    def stiffness(u, v, _):  # type: ignore[no-untyped-def]
+        strain = sym_grad(u)
+        stress = E / (1 + NU) * strain + E * NU / (1 - NU**2) * eye(trace(strain), 2)
+        return PLATE_MM * ddot(stress, sym_grad(v))
+
+    K = stiffness.assemble(basis)
+    upward = np.zeros(basis.N, dtype=bool)
+    for dofs in (basis.nodal_dofs, basis.facet_dofs, basis.interior_dofs):
+        upward[dofs[1]] = True
+    at_x, at_y = basis.doflocs
+    face = (np.abs(at_y - 10.0) < 1e-9) & (at_x > x0 - 1e-9) & (at_x < x1 + 1e-9) & upward
+    free = np.flatnonzero(at_x > 1e-9)
+    moved = np.zeros(basis.N)
+    if held:
+        moved[face] = 1.0
+        inner = np.setdiff1d(free, np.flatnonzero(face))
+        moved[inner] = spsolve(K[inner][:, inner].tocsc(), -(K @ moved)[inner])
+        return float(moved @ (K @ moved))
+    on = mesh.facets_satisfying(lambda p: (np.abs(p[1] - 10.0) < 1e-9) & (p[0] > x0) & (p[0] < x1))
+    load = skfem.LinearForm(lambda v, _: v[1]).assemble(skfem.FacetBasis(mesh, element, facets=on, intorder=4))
+    load /= load.sum()
+    moved[free] = spsolve(K[free][:, free].tocsc(), load[free])
+    return 1.0 / float(load @ moved)
+
+
+@pytest.mark.parametrize("turns", ["free", "held"])
+@pytest.mark.parametrize(("box", "x0"), [("40, 50, 9, 11", 40.0), ("41.3, 50, 10, 10", 41.3)])
+def test_a_face_across_its_drive(tmp_path: Path, turns: str, box: str, x0: float) -> None:
+    drawn = lever(tmp_path, box, f'across = "free"\nturns = "{turns}"')
+    expected = quadrilaterals_n_mm(x0, 50.0, held=turns == "held")
+    for kind in (MechanismPlate, MechanismFrame):
+        assert kind(drawn, width_effect=False).stiffness_n_mm == pytest.approx(expected, rel=FORCE)
+
+
+def test_a_rod_that_pushes_does_not_clamp_whichever_way_the_face_lies(tmp_path: Path) -> None:
+    """By statics: a leaf under a force at the end of a rigid lever."""
+    for box in ("40, 50, 10, 10", "60, 60, 0, 10"):
+        free = lever(tmp_path, box, 'across = "free"')
+        plate, chain = MechanismPlate(free, width_effect=False), MechanismChain(free)
+        arms = {"40, 50, 10, 10": 45.0, "60, 60, 0, 10": 60.0}[box]
+        inertia = PLATE_MM / 12.0
+        # Deflection at the arm by the moment P (arm - x) along the leaf from 10 to 20 mm.
+        compliance = ((arms - 10.0) ** 3 - (arms - 20.0) ** 3) / (3.0 * E * inertia)
+        assert chain.stiffness_n_mm == pytest.approx(1.0 / compliance, rel=0.01)
+        # The leaf's roots and the lever yield too.
+        assert 0.9 / compliance < plate.stiffness_n_mm < 1.0 / compliance
+        assert 'turns = "free"' in free.drives[0].words
+
+
+def test_the_ends_of_a_face_do_not_make_the_frame_jump(tmp_path: Path) -> None:
+    forces = [
+        MechanismFrame(lever(tmp_path, f"{x0}, 50, 9, 11", 'across = "free"\nturns = "held"')).stiffness_n_mm
+        for x0 in (40.0, 40.7, 41.4)
+    ]
+    assert forces[0] > forces[1] > forces[2] > 0.96 * forces[0]
+
+
+def test_what_a_drive_cannot_do_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"turns .* must be 'free' .* but is 'often'"):
+        lever(tmp_path, "40, 50, 10, 10", 'turns = "often"')
