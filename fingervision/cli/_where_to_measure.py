@@ -76,7 +76,8 @@ PICTURE_OPTIONS = (
         default="auto",
         show_default=True,
         metavar="auto|linear|srgb|bt709|FILE",
-        help="Camera response; auto: that of the calibration, else the recording's own tag, else linear.",
+        help="Camera response; auto: that of the calibration, else that which the shape of the edges shows, else the "
+        "recording's own tag, else linear.",
     ),
     click.option(
         "--bits",

@@ -141,11 +141,12 @@ class DefectPixels:
     excess: float
 
 
-# Response assumed for a camera that does not state its response, and the other standard response; the true response is
-# taken to lie between the two.
-ASSUMED_RESPONSE = ResponseEstimate(
-    standard_response("linear"), (OtherResponse(standard_response("srgb"), 1.0 / 3.0),), Origin.ASSUMED
-)
+def assumed_response(name: str) -> ResponseEstimate:
+    """Standard response that is assumed; the true response is taken to lie between it and the other usual one."""
+    other = standard_response("srgb" if name == "linear" else "linear")
+    return ResponseEstimate(standard_response(name), (OtherResponse(other, 1.0 / 3.0),), Origin.ASSUMED)
+
+
 # Error of the model of an edge as a share of its contrast, if the recording does not show it: that of the better
 # lenses (a prior from rendered and real recordings without compression).
 DISCREPANCY = CameraQuantity(0.003)
@@ -175,7 +176,7 @@ class CameraModel:
         Standard deviation of an edge's profile about the best model, as a share of the contrast.
     """
 
-    response: ResponseEstimate = ASSUMED_RESPONSE
+    response: ResponseEstimate = field(default_factory=lambda: assumed_response("linear"))
     point_spread: PointSpread | None = None
     noise: NoiseLaw | None = None
     sharpening: CameraQuantity = CameraQuantity(0.0)

@@ -96,8 +96,8 @@ class GapMeasurement:
         Standard uncertainty of `gap_px` from causes that may have displaced the edges equally in every frame: a bright
         rim, slight overexposure, or residuals that all rows of an edge share although the picture is not declared as
         compressed. Zero if the edges show none of these.
-    response_shift_px : float
-        Difference between `gap_px` and the gap for the alternative camera response that is also possible; zero if the
+    u_response_px : float
+        Standard uncertainty of `gap_px` due to the camera's response, with the sign of the probable error; zero if the
         response is known.
     roughness_px : float
         Standard deviation of rough or textured edges about their mean lines; zero if the deviations do not exceed the
@@ -121,7 +121,7 @@ class GapMeasurement:
     u_gap_px: float
     light_gap: bool
     u_shift_px: float = 0.0
-    response_shift_px: float = 0.0
+    u_response_px: float = 0.0
     roughness_px: float = 0.0
     fields_apart_px: float = 0.0
     beside: str = ""
@@ -132,13 +132,9 @@ class GapMeasurement:
     def u_picture_px(self) -> float:
         """Standard uncertainty of `gap_px` from this picture alone, the same in every frame (pixels).
 
-        The value combines the systematic uncertainty of the edges with that of the unknown camera response.
-
-        For the response, the true gap lies between the values for the assumed and for the alternative response: a
-        rectangular distribution with the measured value at one end (after JCGM 100:2008, 4.3.7, where the value is in
-        the middle).
+        The value combines the systematic uncertainty of the edges with that of the camera's response.
         """
-        return hypot(self.u_shift_px, self.response_shift_px / 3.0**0.5)
+        return hypot(self.u_shift_px, self.u_response_px)
 
     @property
     def status(self) -> Status:

@@ -30,7 +30,7 @@ from fingervision.gauges.straight_edge import (
     NotFound,
 )
 from fingervision.vision.edge_search import StepCandidate
-from fingervision.vision.response_shift import edge_shift_px
+from fingervision.vision.response_shift import u_edge_px
 from fingervision.vision.straight_edge_fit import (
     Band,
     EdgeStart,
@@ -156,11 +156,7 @@ def _edge(follower: "EdgeFollower", picture: Picture, fitted: StraightEdges, k: 
     covariance = fitted.covariance
     contrast = float(fitted.contrast[k])
     inside = fitted.inside + float(fitted.contrast[fitted.position_px < fitted.position_px[k] - 1e-9].sum())
-    other = picture.settings.other_response
-    shift = 0.0
-    if other is not None:
-        levels = (inside / picture.top, (inside + contrast) / picture.top)
-        shift = edge_shift_px(picture.settings.response, other, *levels, fitted.blur_px)
+    shares = (inside / picture.top, (inside + contrast) / picture.top)
     at = follower.at_px + float(fitted.position_px[k])
     reach, half = reach_px(fitted.blur_px), 0.5 * follower.length_px
     wide, high = abs(cos(follower.axes.direction_rad)), abs(sin(follower.axes.direction_rad))
@@ -175,7 +171,7 @@ def _edge(follower: "EdgeFollower", picture: Picture, fitted: StraightEdges, k: 
         contrast,
         inside,
         fitted.blur_px,
-        abs(shift) / 3.0**0.5,
+        u_edge_px(picture.settings.camera.response, *shares, fitted.blur_px),
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.camera import CameraModel
 from fingervision.domain.frame import Frame, LostFrame, Pixels
 from fingervision.gauges.gauge_file import Gauge, check_gauges
 from fingervision.gauges.kinds import measured_together
@@ -157,7 +158,9 @@ class GaugeRecording:
         pending = any(reading.quantities for _, _, readings in self._pending for reading in readings)
         return pending or any(tally.counts[GaugeStatus.OK.value] for tally in self.tallies.values())
 
-    def add(self, frame: Frame | LostFrame, outcome: object = None) -> Sequence[Reading]:
+    def add(
+        self, frame: Frame | LostFrame, outcome: object = None, camera: CameraModel | None = None
+    ) -> Sequence[Reading]:
         """Measure the next frame.
 
         Parameters
@@ -166,18 +169,21 @@ class GaugeRecording:
             The next frame.
         outcome : object
             Result of the gap measurement in this frame; if it is a `LostFrame`, the gauges reject the picture too.
+        camera : CameraModel or None
+            The camera as learnt from the recording; None for that of the settings.
 
         Returns
         -------
         sequence of Reading
             Readings in the order of the gauges.
         """
+        settings = self._settings if camera is None else replace(self._settings, camera=camera)
         lost = outcome if isinstance(outcome, LostFrame) else frame
         readings: Sequence[Reading]
         if isinstance(lost, LostFrame):
             readings = unread(lost, lost.status, len(self._gauges))
         else:
-            readings = measured_together(self._followers, picture_of(lost, self._settings))
+            readings = measured_together(self._followers, picture_of(lost, settings))
         self._newest = readings
         self._pending.append((frame.time_s, frame.index, readings))
         if len(self._pending) >= FRAMES_AT_ONCE:

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from fingervision.inspection.flank_profile import FlankProfile
 from fingervision.inspection.look import Look
-from fingervision.inspection.profile_fit import fit_step
+from fingervision.inspection.profile_fit import StepProfile, fit_step
 from fingervision.vision.profile_lines import INNER
 
 Floats = NDArray[np.float64]
@@ -94,7 +93,7 @@ def _shift_per_slope_px2(blur_px: float, reach_px: float) -> float:
     away = np.arange(-reach_px, reach_px + 0.5 * STEP_PX, STEP_PX)
     step, alike = ndtr(away / blur_px), np.ones_like(away)
     fits = [
-        fit_step(FlankProfile(away, step + slope * np.maximum(away, 0.0), alike, 1.0), blur_px, sloping=False)
+        fit_step(StepProfile(away, step + slope * np.maximum(away, 0.0), alike), blur_px, sloping=False)
         for slope in (0.0, SMALL_SLOPE)
     ]
     return (fits[1].position_px - fits[0].position_px) / SMALL_SLOPE

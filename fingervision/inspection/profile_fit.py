@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from fingervision.inspection.flank_profile import FlankProfile
-
 Floats = NDArray[np.float64]
 
 # A symmetric point spread that is not Gaussian (a disc, a box, sharpening) is modelled by the sum of two Gaussians, the
@@ -16,6 +14,25 @@ Floats = NDArray[np.float64]
 WIDER = 1.8
 # Limits of the fitted blur (pixels).
 LEAST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepProfile:
+    """Mean light across one flank; arrays of shape (n,).
+
+    Parameters
+    ----------
+    away_px : ndarray of float
+        Distance from the fitted edge, perpendicular to it.
+    level : ndarray of float
+        Mean light at this distance.
+    u_level : ndarray of float
+        Standard uncertainty of the mean.
+    """
+
+    away_px: Floats
+    level: Floats
+    u_level: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +57,12 @@ class ProfileFit:
     slope_share: float = 0.0
 
 
-def fit_step(profile: FlankProfile, blur_px: float, *, sloping: bool) -> ProfileFit:
+def fit_step(profile: StepProfile, blur_px: float, *, sloping: bool) -> ProfileFit:
     """Fit a step to a profile by least squares.
 
     Parameters
     ----------
-    profile : FlankProfile
+    profile : StepProfile
         Mean light across the flank.
     blur_px : float
         Initial estimate of the blur.
@@ -68,7 +85,7 @@ def fit_step(profile: FlankProfile, blur_px: float, *, sloping: bool) -> Profile
     return ProfileFit(float(found.x[0]), float(2.0 * found.cost), max(profile.level.size - parameters, 1), share)
 
 
-def _slope_share(profile: FlankProfile, position: float, blur: float) -> float:
+def _slope_share(profile: StepProfile, position: float, blur: float) -> float:
     weight = 1.0 / profile.u_level
     design = _design(profile, position, blur, sloping=True)
     solved, *_ = np.linalg.lstsq(design * weight[:, None], profile.level * weight, rcond=None)
@@ -77,18 +94,18 @@ def _slope_share(profile: FlankProfile, position: float, blur: float) -> float:
     return float(max(changes) / max(abs(solved[1]), 1e-9))
 
 
-def _design(profile: FlankProfile, position: float, blur: float, sloping: bool) -> Floats:
+def _design(profile: StepProfile, position: float, blur: float, sloping: bool) -> Floats:
     away = profile.away_px - position
-    step = _pixel_step(away, blur, profile.pixel_px)
-    wide = _pixel_step(away, WIDER * blur, profile.pixel_px)
+    step = _pixel_step(away, blur)
+    wide = _pixel_step(away, WIDER * blur)
     columns = [np.ones_like(away), step, wide - step]
     if sloping:
         columns += [away * (1.0 - step), away * step]
     return np.stack(columns, axis=1)
 
 
-def _pixel_step(away: Floats, sigma: float, pixel: float) -> Floats:
-    """Gaussian-blurred unit step, averaged over the pixel's width across the edge."""
-    upper, lower = (away + 0.5 * pixel) / sigma, (away - 0.5 * pixel) / sigma
+def _pixel_step(away: Floats, sigma: float) -> Floats:
+    """Gaussian-blurred unit step, averaged over the width of a pixel."""
+    upper, lower = (away + 0.5) / sigma, (away - 0.5) / sigma
     density = (np.exp(-0.5 * upper**2) - np.exp(-0.5 * lower**2)) / np.sqrt(2.0 * np.pi)
-    return np.asarray(sigma / pixel * (upper * ndtr(upper) - lower * ndtr(lower) + density))
+    return np.asarray(sigma * (upper * ndtr(upper) - lower * ndtr(lower) + density))

@@ -14,12 +14,12 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
-from fingervision.inspection.blocks import BLOCKY, blockiness
+from fingervision.inspection.blocks import blockiness
 from fingervision.inspection.finding import GOOD_PX, MOSTLY_REFUSED, POOR_TIMES
 from fingervision.inspection.ground_shift import GroundShift, GroundTracker
 from fingervision.inspection.look import Look
 from fingervision.inspection.noise_bound import GOOD_BLUR_PX, GOOD_NOISE
-from fingervision.inspection.response_evidence import ResponseEvidence, response_evidence
+from fingervision.measuring.camera_learning import learnt_first
 from fingervision.measuring.scale import Scale
 from fingervision.vision.binarise import binarise
 from fingervision.vision.denoise import denoise
@@ -33,8 +33,6 @@ Floats = NDArray[np.float64]
 # Number of frames inspected in detail, evenly distributed over all frames read: enough to average noise, and few enough
 # for 4K frames.
 CLOSELY = 16
-# If the edges support the alternative response with this probability, it is used for the rest of the inspection.
-SURELY = 0.9
 # Rims and side walls of a tenth of the contrast can be detected below this ratio of noise to contrast.
 SEEING_NOISE = 2.0 * GOOD_NOISE
 # Ratio of the median difference between neighbouring pixels to the noise (0.6745 sqrt(2) for normal noise), and ratio
@@ -56,7 +54,7 @@ class Sample:
     description : Description
         The recording.
     settings : Settings
-        Settings of the measurement; the response is the one that the edges support.
+        Settings of the measurement, with the camera as learnt from the first frames.
     scale : Scale or None
         Conversion from pixels to millimetres; None if not stated.
     looks : tuple of Look
@@ -74,8 +72,6 @@ class Sample:
         fingers, positions of both tips along the fingers, standard uncertainties across and of the tips (pixels).
     ground : GroundShift
         Motion of the background relative to the first frame.
-    response : ResponseEvidence
-        Evidence for the camera response from the shape of the edges.
     last_frame : Frame or None
         Frame to be shown in the picture of the inspection.
     """
@@ -90,7 +86,6 @@ class Sample:
     counts: Counter[Status]
     track: Floats
     ground: GroundShift
-    response: ResponseEvidence
 
     @property
     def frames(self) -> int:
@@ -215,6 +210,8 @@ def take_sample(
     scale : Scale or None
         Conversion from pixels to millimetres.
     """
+    frames, camera = learnt_first(frames, settings, scale)
+    settings = replace(settings, camera=camera)
     kept: list[Frame] = []
     every, read = 1, 0
     counts: Counter[Status] = Counter()
@@ -242,15 +239,6 @@ def take_sample(
         read += 1
     kept = kept[:: max(1, -(-len(kept) // CLOSELY))]
     looks = _looks(kept, settings)
-    evidence = response_evidence(
-        [(look.upright, look.edges) for look in looks],
-        settings,
-        _median_shift(looks),
-        lossy=description.lossy or any(blockiness(look.frame.pixels) > BLOCKY for look in looks),
-    )
-    if evidence.share_other > SURELY and settings.other_response is not None:
-        settings = replace(settings, response=settings.other_response, other_response=None)
-        looks = _looks(kept, settings) or looks
     found = np.array(track, dtype=np.float64).reshape(-1, 7)
     fingers = None if refused_frame is None else look_closely(refused_frame, settings)[1]
     return Sample(
@@ -264,7 +252,6 @@ def take_sample(
         counts,
         found,
         tracker.shift(),
-        evidence,
     )
 
 
@@ -280,11 +267,6 @@ def _looks(frames: Iterable[Frame], settings: Settings) -> tuple[Look, ...]:
             top = settings.response.top_level or top_level(grey, settings.bits)
             looks.append(Look(frame, fingers.orientation.view(grey), outcome, fingers, edges, top))
     return tuple(looks)
-
-
-def _median_shift(looks: Iterable[Look]) -> float:
-    shifts = [look.outcome.response_shift_px for look in looks]
-    return float(np.median(shifts)) if shifts else 0.0
 
 
 def _place(index: int, m: GapMeasurement) -> tuple[float, ...]:

@@ -1,11 +1,13 @@
 """Measurement of single frames of a live view, and their table rows."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.live.choices import Choices
+from fingervision.live.live_camera import LiveCamera
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.storage.gaps_csv import GapRow
@@ -42,13 +44,19 @@ class FrameMeasurement:
         Files of a recording, whose metadata may state the coding of grey levels; empty for a live source.
     fingers_are_dark : bool or None
         Whether the fingers are darker than the background; None to detect this in every frame.
+    tell : callable
+        Called with a sentence once the camera has been learnt.
     """
 
     def __init__(
-        self, frame_size_px: tuple[int, int], files: tuple[Path, ...] = (), fingers_are_dark: bool | None = None
+        self,
+        frame_size_px: tuple[int, int],
+        files: tuple[Path, ...] = (),
+        fingers_are_dark: bool | None = None,
+        tell: Callable[[str], None] = lambda words: None,
     ) -> None:
         self._frame_size_px, self._files, self._fingers_are_dark = frame_size_px, files, fingers_are_dark
-        self._pictures = SoundPictures()
+        self._pictures, self._camera = SoundPictures(), LiveCamera(tell)
 
     def measured(
         self, item: Frame | LostFrame, choices: Choices
@@ -82,7 +90,10 @@ class FrameMeasurement:
 
     def _found(self, frame: Frame, choices: Choices) -> GapMeasurement | NoGap | LostFrame:
         assert choices.task is not None  # noqa: S101 - asked before
-        settings, _ = choices.task.settings_for(self._files)
+        settings = self._camera.used(choices.task.settings_for(self._files)[0], choices.task)
         if self._fingers_are_dark is not None:
             settings = replace(settings, fingers_are_dark=self._fingers_are_dark)
-        return self._pictures.judged(frame, measure_frame(frame, settings))
+        outcome = self._pictures.judged(frame, measure_frame(frame, settings))
+        if isinstance(outcome, GapMeasurement):
+            self._camera.add(frame, settings, choices.task)
+        return outcome

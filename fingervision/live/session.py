@@ -162,7 +162,9 @@ class Session:
         """Functions that the measuring thread calls with every frame, to measure more than the gap."""
         self.driven_at: DrivenAt = lambda time_s: None
         """Function that returns the gripper's input at a time of this view, if the source gives no input."""
-        self._measurement = FrameMeasurement((self.description.width_px, self.description.height_px))
+        self._measurement = FrameMeasurement(
+            (self.description.width_px, self.description.height_px), tell=lambda words: self.say("camera", words)
+        )
         self._frame_at_s = monotonic()
         self._interrupted, self._run = False, ""
         self._recorder: Recorder | None = None

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.limits import rectangular
 from calib.measured_scale import Calibration
 from fingervision.domain.body_poses import COVERED, DAMAGED, NOT_FOUND, OK, OUT_OF_VIEW, FramePoses, SeenPose
 from fingervision.domain.errors import DataError
@@ -34,7 +33,7 @@ from fingervision.models.mechanism_bodies import column_name
 from fingervision.storage.bodies_csv import add_channels, write_bodies
 from fingervision.vision.outline_chunks import Chunks, EdgeView, FlatMap
 from fingervision.vision.pipeline import Settings
-from fingervision.vision.response_shift import edge_shift_px
+from fingervision.vision.response_shift import u_edge_px
 from fingervision.vision.rigid_outline import LEAST_IN_VIEW, RigidFit, capture_rigid, fit_rigid, halved
 
 Array = NDArray[np.float64]
@@ -199,11 +198,9 @@ class BodyTracker:
             )
         notes = placed.notes if laid.by_fixed else (*placed.notes, LAID_BY_ALL)
         self.placed = Placed(laid.place, placed.body_is_dark, notes)
-        other, shift_px = self.settings.other_response, 0.0
-        if other is not None:
-            shares = (inside / picture.top, ground / picture.top)
-            shift_px = edge_shift_px(self.settings.response, other, *shares, laid.fit.blur_px)
-        self._shared = SharedErrors(laid.fit, laid.about_px, plane, rectangular(abs(shift_px)))
+        shares = (inside / picture.top, ground / picture.top)
+        u_px = u_edge_px(self.settings.camera.response, *shares, laid.fit.blur_px)
+        self._shared = SharedErrors(laid.fit, laid.about_px, plane, u_px)
         self._chunks = [outline.chunks(laid.place) for outline in self.outlines]
         self._about = [outline.about_px(laid.place) for outline in self.outlines]
         self._last: list[tuple[Array, float]] = [(np.zeros(2), 0.0)] * len(self.outlines)

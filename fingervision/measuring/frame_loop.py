@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 from time import monotonic
 from types import FrameType
 
+from fingervision.domain.camera import CameraModel
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import Description, FrameSource
+from fingervision.measuring.camera_learning import learnt_first
 from fingervision.measuring.frame_sequence import Judged, in_sequence
 from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.marked import marked
@@ -160,6 +162,10 @@ class Prepared:
     row_maker: RowMaker
     frames: tuple[int, int] | None = None
 
+    def with_camera(self, camera: CameraModel) -> "Prepared":
+        """Return the same with what was learnt about the camera."""
+        return replace(self, settings=replace(self.settings, camera=camera))
+
 
 def prepared(description: Description, task: Task) -> Prepared:
     """Collect the information on a recording that is known before its frames are read."""
@@ -231,7 +237,7 @@ def measure_frames(
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(items, how.settings, description.coding, series.votes, asked.is_set):
+            for item, outcome in _outcomes(items, how, series, asked.is_set):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if see_item is not None:
@@ -251,23 +257,26 @@ def measure_frames(
 
 def _outcomes(
     source: Iterable[Frame | LostFrame],
-    settings: Settings,
-    coding: Coding,
-    votes: Counter[str],
+    how: Prepared,
+    series: GapSeries,
     is_stopped: Callable[[], bool],
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Yield every frame with its result; the decoder runs ahead, and stops when this generator is closed."""
     pictures = SoundPictures()
 
     def judged(frames: Iterable[Frame | LostFrame]) -> Iterator[Judged]:
-        for item, outcome in one_polarity(coded(frames, coding), settings, votes, is_stopped):
+        settings = replace(how.settings, camera=series.camera)
+        for item, outcome in one_polarity(frames, settings, series.votes, is_stopped):
             if isinstance(item, LostFrame) or isinstance(outcome, LostFrame):
                 yield item, outcome
             else:
                 yield item, pictures.judged(item, outcome)
 
     with closing(decoded_ahead(source)) as frames:
-        yield from in_sequence(judged(frames))
+        first, series.camera = learnt_first(
+            coded(frames, how.description.coding), how.settings, how.row_maker.scale, is_stopped
+        )
+        yield from in_sequence(judged(first))
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:

@@ -105,7 +105,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
 
     def see_item(item: Frame | LostFrame, result: Result) -> None:
         if gauges is not None:
-            gauges.add(item, result.outcome)
+            gauges.add(item, result.outcome, series.camera)
         if not first and isinstance(item, Frame):
             # The pixels are copied, because the decoder may use its memory again for the next picture.
             first.append(replace(item, pixels=item.pixels.copy()))
@@ -114,6 +114,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
         if gauges is not None:
             stack.enter_context(gauges)
         stopped = measure_frames(source, how, series, take_rows, see_item, on_progress)
+    how = how.with_camera(series.camera)
     clock = clock_for(series, task)
     if isinstance(clock, ClockOffset):
         rows = [_with_drive(row, task, clock) for row in rows]

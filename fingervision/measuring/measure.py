@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -119,15 +119,21 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
 
         def see_item(item: Frame | LostFrame, result: Result) -> None:
             if gauges is not None:
-                gauges.add(item, result.outcome)
+                gauges.add(item, result.outcome, series.camera)
             if video is not None and isinstance(item, Frame):
                 row = how.row_maker.rows([result])[0]
                 video.add(item, result.outcome, row, None if gauges is None else gauges.draw)
             if isinstance(item, Frame) and item.index == task.steps_frame:
-                write_steps(item, how.settings, folder.steps, () if gauges is None else gauges.steps(item))
+                write_steps(
+                    item,
+                    replace(how.settings, camera=series.camera),
+                    folder.steps,
+                    () if gauges is None else gauges.steps(item),
+                )
 
         is_seen = video is not None or gauges is not None or task.steps_frame is not None
         stopped = measure_frames(source, how, series, take_rows, see_item if is_seen else None, on_progress)
+    how = how.with_camera(series.camera)
     clock = clock_for(series, task)
     if isinstance(clock, ClockOffset) and task.drive is not None:
         join_drive(folder.gaps, task.drive, clock)

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.camera_response import CameraResponse, standard_response
+from calib.camera_response import CameraResponse
 from calib.measured_scale import Calibration
+from fingervision.domain.camera import Origin, ResponseEstimate, assumed_response
 from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.transfer_tag import transfer_tag
 from fingervision.measuring.bias_share import bias_shares
@@ -23,40 +24,30 @@ def u_response_shift_mm(measured: Sequence[GapMeasurement], scale: Scale) -> NDA
     """
     if not isinstance(scale, Calibration) or scale.response_shift_px is None:
         return np.zeros(len(measured))
-    shift_px = np.array([m.response_shift_px for m in measured])
+    u_px = np.array([m.u_response_px for m in measured])
     polarity = np.where([m.light_gap for m in measured], 1.0, -1.0) * bias_shares(measured).mean(axis=1)
-    left_px = np.where(shift_px == 0.0, 0.0, shift_px - polarity * scale.response_shift_px)
-    return np.asarray(np.abs(left_px) / np.sqrt(3.0) / scale.px_per_mm)
+    left_px = np.where(u_px == 0.0, 0.0, u_px - polarity * scale.response_shift_px / np.sqrt(3.0))
+    return np.asarray(np.abs(left_px) / scale.px_per_mm)
 
 
 def choose_response(
     stated: CameraResponse | None, scale: Scale, files: tuple[Path, ...]
-) -> tuple[CameraResponse, CameraResponse | None, str]:
-    """Choose the response of a recording, another response that is also possible, and a warning if needed.
+) -> tuple[ResponseEstimate, str]:
+    """Choose the response of a recording before its frames are read, and a warning if needed.
 
     The response stated by the user has priority, then the response stated by the calibration, then the recording's own
     tag; otherwise the response is assumed to be linear.
-
-    Returns
-    -------
-    response : CameraResponse
-        Response by which levels are converted to light.
-    other : CameraResponse or None
-        Another possible response; None if the response is known.
-    words : str
-        A warning; empty if none is needed.
     """
     calibrated = scale.camera_response if isinstance(scale, Calibration) else None
     known = isinstance(scale, Calibration) and scale.response_known
     tag = transfer_tag(files)
     if stated is not None:
-        response, other = stated, None
+        response = ResponseEstimate(stated, (), Origin.STATED)
     elif known and calibrated is not None:
-        response, other = calibrated, None
+        response = ResponseEstimate(calibrated, (), Origin.CALIBRATED)
     else:
-        response = standard_response(tag or "linear")
-        other = standard_response("srgb" if response.name == "linear" else "linear")
-    if calibrated is not None and calibrated.name != response.name:
+        response = assumed_response(tag or "linear")
+    if calibrated is not None and calibrated.name != response.curve.name:
         shift_px = scale.response_shift_px if isinstance(scale, Calibration) else None
         size = (
             ""
@@ -65,17 +56,15 @@ def choose_response(
         )
         return (
             response,
-            other,
             f"The calibration was made with the camera response {calibrated.name}, but this recording is measured "
-            f"with the response {response.name}{size}: calibrate with this camera, or state the same --response for "
-            f"both.",
+            f"with the response {response.curve.name}{size}: calibrate with this camera, or state the same --response "
+            "for both.",
         )
     if stated is None and known and tag is not None and calibrated is not None and tag != calibrated.name:
         return (
             response,
-            other,
             f"A tag in the recording states the camera response {tag}, but that of the calibration, "
             f"{calibrated.name}, is used: "
             "state --response if another camera made this recording.",
         )
-    return response, other, ""
+    return response, ""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.budget import Budget
+from fingervision.domain.camera import ASSUMED_CAMERA, CameraModel
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.status import Status
 from fingervision.measuring.rows import Result
@@ -66,6 +67,8 @@ class GapSeries:
         Number of dark and light results among the first frames, before the polarity was decided.
     has_budget : bool
         Whether the scale has an uncertainty budget.
+    camera : CameraModel
+        The camera, as learnt from the first frames.
     """
 
     counts: Counter[Status] = field(default_factory=Counter)
@@ -74,6 +77,7 @@ class GapSeries:
     beside: Counter[str] = field(default_factory=Counter)
     votes: Counter[str] = field(default_factory=Counter)
     has_budget: bool = False
+    camera: CameraModel = ASSUMED_CAMERA
     _squares: dict[tuple[str, str, str], float] = field(default_factory=dict)
     _frame: array[int] = field(default_factory=lambda: array("q"))
     _time_s: array[float] = field(default_factory=lambda: array("d"))
@@ -122,7 +126,7 @@ class GapSeries:
             self._gap_mm.append(row.gap_mm)
             self._u_random_mm.append(row.u_random_mm)
             self._u_gap_px.append(row.u_gap_px)
-            self._response_px.append(abs(getattr(result.outcome, "response_shift_px", 0.0)))
+            self._response_px.append(abs(getattr(result.outcome, "u_response_px", 0.0)))
             self.has_budget = row.u_gap_mm is not None
             self._u_mm.append(row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm)
 
@@ -169,10 +173,7 @@ class GapSeries:
 
     @property
     def response_px(self) -> NDArray[np.float64]:
-        """Change of each gap (px) under the alternative camera response.
-
-        The change is 0 if the response is known.
-        """
+        """Standard uncertainty of each gap (px) due to the camera's response; 0 if the response is known."""
         return np.array(self._response_px)
 
     def times_s(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from calib.measured_scale import Calibration
 from calib.stated_scale import is_stated
 from fingervision import __version__
+from fingervision.domain.camera import CameraQuantity, Origin
 from fingervision.domain.errors import InputFileError
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
@@ -124,6 +125,7 @@ def summarise(
             for status, found in series.first_without.items()
         },
         "gap": _statistics(series),
+        "camera": _camera(series),
         "uncertainty": {**_uncertainty(scale, settings), "parts": series.budget},
         "advice": [
             *_about_unseen(description, series),
@@ -133,6 +135,47 @@ def summarise(
             *([NO_LIMITS.format(name=scale_file or "given")] if _states_no_limits(scale) else []),
             *description.notes,
         ],
+    }
+
+
+def _camera(series: GapSeries) -> dict[str, Any]:
+    """What is known about the camera: each property with its value, standard uncertainty and origin."""
+    camera, response_px = series.camera, series.response_px
+
+    def quantity(of: CameraQuantity, unit: str) -> dict[str, Any]:
+        return {"value": of.value, "u": of.u, "unit": unit, "origin": of.origin.value}
+
+    spread, noise = camera.point_spread, camera.noise
+    unknown = {"value": None, "u": None, "origin": Origin.ASSUMED.value}
+    return {
+        "response": {
+            "value": camera.response.curve.name,
+            "u": float(np.median(response_px)) if response_px.size else None,
+            "unit": "px of the gap",
+            "origin": camera.response.origin.value,
+            "words": camera.response.words,
+        },
+        "point_spread": unknown
+        if spread is None
+        else {
+            **quantity(spread.sigma_px, "px"),
+            "disc_share": spread.disc_share,
+            "wing_share": spread.wing_share,
+            "skew": spread.skew,
+        },
+        "noise": unknown
+        if noise is None
+        else {
+            **quantity(noise.dark_variance, "full scale squared"),
+            "per_light": quantity(noise.variance_per_light, "full scale squared per light"),
+        },
+        "sharpening": quantity(camera.sharpening, "share of the contrast"),
+        "lag": quantity(camera.lag, "frames"),
+        "defects": {
+            "value": [asdict(defect) for defect in camera.defects],
+            "u": None,
+            "origin": camera.defects_origin.value,
+        },
     }
 
 
@@ -215,8 +258,8 @@ def _scale(scale: Scale, file: Path | None) -> dict[str, Any]:
 
 def _uncertainty(scale: Scale, settings: Mapping[str, Any]) -> dict[str, Any]:
     response = (
-        f"the camera's response, assumed to be {settings.get('response', 'linear')} and not measured: change of the "
-        "gap under another response, as far as the calibration does not correct it (u_shift_px includes all of it)"
+        f"the camera's response, taken as {settings.get('response', 'linear')} and not measured: change of the gap "
+        "under other possible responses, as far as the calibration does not correct it (u_shift_px includes all of it)"
     )
     is_assumed = not settings.get("response_known", True)
     random = (

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from calib.camera_response import CameraResponse
+from fingervision.domain.camera import CameraModel
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import UsageError
@@ -97,17 +98,16 @@ class Task:
 
     def settings_for(self, files: tuple[Path, ...]) -> tuple[Settings, str]:
         """Settings for the image processing of a recording that consists of these files, and a warning if needed."""
-        response, other, words = choose_response(self.response, self.scale, files)
+        response, words = choose_response(self.response, self.scale, files)
         below_px = self.below_tip_mm * self.scale.px_per_mm
         settings = Settings(
             below_px,
             self.direction,
             self.region,
-            response,
-            other,
             self.bits,
             self.fingers_are_dark,
             self.is_outline,
+            CameraModel(response),
         )
         return settings, words
 
@@ -179,7 +179,7 @@ def in_words(task: Task, settings: Settings) -> dict[str, Any]:
         "tips": "auto" if task.direction is None else task.direction.value,
         "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
         "response": settings.response.name,
-        "response_known": settings.other_response is None,
+        "response_known": settings.camera.response.is_known,
         "bits": task.bits,
         "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
         "face": "outline" if task.is_outline else "front",

@@ -37,7 +37,7 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
                 f"U = {2e3 * gap['median_u_random_mm']:.2f} µm (k = 2, median) from frame to frame; U does not "
                 "include the uncertainty of the scale, which was not stated."
             )
-        lines += _assumed_response(summary, series)
+        lines += [*_learnt_camera(summary), *_assumed_response(summary, series)]
     return [*lines, *summary["advice"]]
 
 
@@ -48,14 +48,27 @@ def _assumed_response(summary: Mapping[str, Any], series: GapSeries) -> list[str
     if settings.get("response_known", True) or in_budget:
         return []
     u_mm = gap["median_u_random_mm"] if gap["median_u_gap_mm"] is None else gap["median_u_gap_mm"]
-    moved_mm = float(np.median(series.response_px)) / summary["scale"]["px_per_mm"]
+    moved_mm = COVERAGE_FACTOR * float(np.median(series.response_px)) / summary["scale"]["px_per_mm"]
     if moved_mm <= COVERAGE_FACTOR * u_mm:
         return []
+    if words := summary["camera"]["response"]["words"]:
+        return [
+            f"{words} This may change the gap by {1e3 * moved_mm:.1f} µm (k = 2, median), which U does not include."
+        ]
     return [
-        f"The camera's response is not known and was taken as {settings['response']}; another usual response would "
-        f"change the gap by {1e3 * moved_mm:.1f} µm (median), which U does not include: state the response with "
+        f"The camera's response is not known and was taken as {settings['response']}; what is open about it may change "
+        f"the gap by {1e3 * moved_mm:.1f} µm (k = 2, median), which U does not include: state the response with "
         "--response, or measure it with `fingervision calibrate response`."
     ]
+
+
+def _learnt_camera(summary: Mapping[str, Any]) -> list[str]:
+    """Line on the camera, if its response was learnt from the recording as another than the linear one."""
+    response, spread = summary["camera"]["response"], summary["camera"]["point_spread"]
+    if response["origin"] != "learnt" or response["value"] == "linear":
+        return []
+    blur = "" if spread["value"] is None else f", blur {spread['value']:.2f} px"
+    return [f"Camera, learnt from the recording: response {response['value']} (levels converted to light){blur}."]
 
 
 def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fingervision.domain.camera import Origin
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.reference_slot import ReferenceSlot
 from fingervision.storage.csv_columns import read_columns
@@ -82,10 +83,25 @@ def response_note(summary: Mapping[str, Any], shifts_px: Iterable[float]) -> tup
     size = ""
     if found and statistics.median(found) > 0.0:
         size = f" by up to {1e3 * statistics.median(found) / px_per_mm:.2g} um (u_shift_px, median)"
+    if _origin(summary) == Origin.LEARNT:
+        return (f"the camera's response was learnt from the recording as {response}{_open(found, px_per_mm)}.",)
     return (
         f"the camera's response is not known and was taken as {response}: another usual response may change all gaps "
         f"equally{size}, like an offset; measure the response with `fingervision calibrate response`.",
     )
+
+
+def _origin(summary: Mapping[str, Any]) -> object:
+    try:
+        return summary["camera"]["response"]["origin"]
+    except (LookupError, TypeError):
+        return None
+
+
+def _open(shifts_px: list[float], px_per_mm: float) -> str:
+    if not shifts_px:
+        return ""
+    return f"; with what lies beside the edges, this leaves {2e3 * statistics.median(shifts_px) / px_per_mm:.2g} um (U)"
 
 
 def response_note_beside(table: Path) -> tuple[str, ...]:

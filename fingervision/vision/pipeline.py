@@ -34,12 +34,12 @@ from fingervision.vision.picture_memory import keep_picture_memory
 from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.residuals import SHARED_POINTS
-from fingervision.vision.response_shift import gap_shift_px
-from fingervision.vision.settings import LINEAR, SRGB, Settings
+from fingervision.vision.response_shift import u_gap_response_px
+from fingervision.vision.settings import LINEAR_CAMERA, Settings
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
-__all__ = ["LINEAR", "SRGB", "Settings", "look_closely", "measure_frame", "steps"]
+__all__ = ["LINEAR_CAMERA", "Settings", "look_closely", "measure_frame", "region_of_interest", "steps"]
 
 # Least contrast between the two classes of a picture, as a share of full scale.
 CONTRAST_FLOOR = 0.03
@@ -76,7 +76,7 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     if cv2.getNumThreads() != 1:
         cv2.setNumThreads(1)
     keep_picture_memory()
-    grey = _part(to_grey(frame.pixels), settings.region)
+    grey = region_of_interest(to_grey(frame.pixels), settings.region)
     return _shifted(_attempt(grey, settings, coded_picture(frame, settings)).outcome, settings.region)
 
 
@@ -101,7 +101,9 @@ def look_closely(
     edges : EdgePoints or None
         Sub-pixel outlines of the fingers, in pixels of the measured region; None if not measured.
     """
-    attempt = _attempt(_part(to_grey(frame.pixels), settings.region), settings, coded_picture(frame, settings))
+    attempt = _attempt(
+        region_of_interest(to_grey(frame.pixels), settings.region), settings, coded_picture(frame, settings)
+    )
     return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
 
 
@@ -120,7 +122,7 @@ def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     list of (str, ndarray of uint8)
         Name and picture of each step: grey, denoised, binary, boundary, edges, and the measured gap.
     """
-    grey = _part(to_grey(frame.pixels), settings.region)
+    grey = region_of_interest(to_grey(frame.pixels), settings.region)
     denoised = denoise(grey)
     attempt = _attempt(grey, settings, coded_picture(frame, settings))
     own = Frame(in_eight_bits(grey), frame.index)
@@ -136,7 +138,8 @@ def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     ]
 
 
-def _part(grey: GreyImage, region: Region | None) -> GreyImage:
+def region_of_interest(grey: GreyImage, region: Region | None) -> GreyImage:
+    """Part of a picture that is measured."""
     if region is None:
         return grey
     rows = slice(region.y_px, region.y_px + region.height_px)
@@ -217,9 +220,8 @@ def _measured(
             outcome = replace(outcome, roughness_px=0.0)
         if isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_PX * sqrt(SHARED_POINTS[coded.coding]):
             outcome = replace(TOO_ROUGH, held=outcome.held)
-    if settings.other_response is not None and isinstance(outcome, GapMeasurement):
-        shift = gap_shift_px(outcome, edges, settings.response, settings.other_response, scale.top)
-        outcome = replace(outcome, response_shift_px=shift)
+    if isinstance(outcome, GapMeasurement):
+        outcome = replace(outcome, u_response_px=u_gap_response_px(outcome, edges, settings.camera.response, scale.top))
     return _Attempt(outcome, split, fingers, edges)
 
 

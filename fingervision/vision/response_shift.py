@@ -1,12 +1,13 @@
-"""Shift of a fitted edge under another camera response: the uncertainty due to an assumed response."""
+"""Shift of a fitted edge under other camera responses: the uncertainty of a response that is assumed or learnt."""
 
 from functools import lru_cache
-from math import hypot, log
+from math import copysign, hypot, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.camera_response import CameraResponse, standard_response
+from calib.camera_response import CameraResponse
+from fingervision.domain.camera import ResponseEstimate
 from fingervision.domain.gap import GapMeasurement
 from fingervision.vision.edge_filters import PIXEL_VARIANCE, Lines, blurred_step, edge_filters, reach_for
 from fingervision.vision.edges import EdgePoints
@@ -39,35 +40,44 @@ def edge_shift_px(
     """
     levels = [round(min(max(share, 0.0), 1.0) / LEVEL_STEP) for share in (inside, outside)]
     blur = round(log(max(blur_px, 0.2)) / log(BLUR_RATIO))
-    return 0.0 if levels[0] == levels[1] else _shift(assumed.name, other.name, *levels, blur)
+    return 0.0 if levels[0] == levels[1] else _shift(assumed, other, *levels, blur)
 
 
-def gap_shift_px(
-    measured: GapMeasurement, edges: EdgePoints, assumed: CameraResponse, other: CameraResponse, top_level: int
-) -> float:
-    """Measured gap minus the gap under another camera response, if the other response is the true one (pixels).
+def u_edge_px(response: ResponseEstimate, inside: float, outside: float, blur_px: float) -> float:
+    """Standard uncertainty of an edge's position due to the camera's response (pixels); see `edge_shift_px`."""
+    return sqrt(
+        sum(
+            each.weight * edge_shift_px(response.curve, each.response, inside, outside, blur_px) ** 2
+            for each in response.others
+        )
+    )
 
-    A finger's whole outline shifts, including the tip, and the measuring height shifts with the tip, which matters if
-    the edge is slanted.
+
+def u_gap_response_px(measured: GapMeasurement, edges: EdgePoints, response: ResponseEstimate, top_level: int) -> float:
+    """Standard uncertainty of the gap due to the camera's response, with the sign of the gap's probable error (pixels).
+
+    A finger's whole outline shifts along its normal, including the tip, and the measuring height shifts with the tip,
+    which matters if the edge is slanted.
     """
-    total = 0.0
+    sides = []
     for k, (finger, slope) in enumerate(
         ((measured.left, measured.left.slope), (measured.right, -measured.right.slope))
     ):
         inside, outside = (level / top_level for level in (edges.inside[k], edges.inside[k] + finger.contrast))
-        outward = edge_shift_px(assumed, other, inside, outside, float(edges.blur_px[k, 0]))
-        total -= outward * (hypot(1.0, slope) - slope)
-    return total
+        sides.append((inside, outside, float(edges.blur_px[k, 0]), hypot(1.0, slope) - slope))
+    variance, mean = 0.0, 0.0
+    for other in response.others:
+        shift = -sum(share * edge_shift_px(response.curve, other.response, *side) for *side, share in sides)
+        variance, mean = variance + other.weight * shift**2, mean + other.weight * shift
+    return copysign(sqrt(variance), mean)
 
 
-@lru_cache(maxsize=4096)
-def _shift(assumed: str, other: str, inside: int, outside: int, blur: int) -> float:
-    """Fit a step of light encoded by one standard response and decoded by another."""
+@lru_cache(maxsize=8192)
+def _shift(assumed: CameraResponse, other: CameraResponse, inside: int, outside: int, blur: int) -> float:
+    """Fit a step of light encoded by one response and decoded by another."""
     sigma = BLUR_RATIO**blur
     shares = np.linspace(0.0, 1.0, STEPS)
-    assumed_light, other_light = (
-        standard_response(name).table(STEPS - 1, STEPS) / (STEPS - 1) for name in (assumed, other)
-    )
+    assumed_light, other_light = (np.interp(shares, each.level, each.light) for each in (assumed, other))
     plateaus = np.array([inside, outside]) * LEVEL_STEP
     # Conversion from the light under the assumed response to stored levels, and on to the light under the other
     # response; and back.

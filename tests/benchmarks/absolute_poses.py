@@ -29,7 +29,7 @@ from fingervision.measuring.body_poses import BodyTracker
 from fingervision.measuring.drawing_placement import GivenPoint
 from fingervision.measuring.scale import Scale
 from fingervision.storage.mechanism_toml import mechanism_from_tables
-from fingervision.vision.pipeline import Settings
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings
 from tests.diagnosis.lever_drawing import TABLES
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ BOXES = {
 }
 """The lever of `tests/diagnosis/lever_drawing.py` between its notches, x and y in mm."""
 NECKS = ((34.6, 35.4, 31, 37), (17.6, 18.4, 31, 37))
-KNOWN_LIGHT = Settings(below_tip_px=1.0, other_response=None)
+KNOWN_LIGHT = Settings(below_tip_px=1.0, camera=LINEAR_CAMERA)
 """The pictures' levels are light, and that is known."""
 MIDDLE_MM = np.array([24.5, 45.0])
 SUB = np.array([-0.5, 0.5]) / 3.0**0.5

@@ -27,7 +27,7 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.video_file import VideoFile
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 
 Floats = NDArray[np.float64]
 WIDTH, HEIGHT, FRAMES = 640, 480, 16
@@ -205,7 +205,7 @@ def line(name: str, clips: int, seed: int) -> tuple[str, Floats]:
     errors, stated, lost, seconds = [], [], {}, 0.0
     for shot in shots(name, clips, seed):
         begun = time.process_time()
-        found = measure_frame(shot.frame, Settings(shot.below_px, Direction.UP, other_response=None))
+        found = measure_frame(shot.frame, Settings(shot.below_px, Direction.UP, camera=LINEAR_CAMERA))
         seconds += time.process_time() - begun
         if isinstance(found, GapMeasurement):
             errors.append(found.gap_px - shot.gap_px)

@@ -11,7 +11,7 @@ from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.region import Region
 from fingervision.vision.coding_error import displaced_px
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 from tests.benchmarks.compressed_video import Shot, shots
 
 # Recordings a class; four pictures of each are measured. Two u hold 95 % of errors: of 16 pictures in four recordings,
@@ -23,7 +23,7 @@ MOST_REFUSED = 1
 
 
 def measured(shot: Shot, frame: Frame) -> GapMeasurement:
-    outcome = measure_frame(frame, Settings(shot.below_px, Direction.UP, other_response=None))
+    outcome = measure_frame(frame, Settings(shot.below_px, Direction.UP, camera=LINEAR_CAMERA))
     assert isinstance(outcome, GapMeasurement)
     return outcome
 
@@ -33,7 +33,7 @@ def measured(shot: Shot, frame: Frame) -> GapMeasurement:
 def test_two_u_hold_the_errors_of_upright_fingers(name: str) -> None:
     within = refused = total = 0
     for shot in shots(name, CLIPS, 5):
-        found = measure_frame(shot.frame, Settings(shot.below_px, Direction.UP, other_response=None))
+        found = measure_frame(shot.frame, Settings(shot.below_px, Direction.UP, camera=LINEAR_CAMERA))
         total += 1
         if isinstance(found, GapMeasurement):
             within += abs(found.gap_px - shot.gap_px) < 2.0 * np.hypot(found.u_gap_px, found.u_picture_px)
@@ -69,7 +69,7 @@ def test_each_edge_has_its_share_of_step_over_contrast(one: Shot) -> None:
 def test_a_region_and_a_turned_camera_see_the_same_quantiser(one: Shot) -> None:
     assert one.frame.quantiser is not None
     found = measured(one, one.frame)
-    settings = Settings(one.below_px, Direction.UP, other_response=None)
+    settings = Settings(one.below_px, Direction.UP, camera=LINEAR_CAMERA)
     region = Region(37, 21, 580, 440)
     part = measure_frame(one.frame, replace(settings, region=region))
     assert isinstance(part, GapMeasurement)

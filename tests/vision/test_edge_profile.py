@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from calib.camera_response import standard_response
+from fingervision.domain.camera import stated_camera
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement, NoGap
@@ -71,7 +72,7 @@ def test_white_of_studio_range_is_cut_off(exposure: float) -> None:
     signal = np.where(pixels < 0.018, 4.5 * pixels, 1.0993 * pixels**0.45 - 0.0993)
     stored = np.rint(16.0 + 219.0 * signal).astype(np.uint8)
     response = standard_response("bt709_studio")
-    found = measure_frame(Frame(stored, 0), Settings(10.2, Direction.UP, response=response))
+    found = measure_frame(Frame(stored, 0), Settings(10.2, Direction.UP, camera=stated_camera(response)))
     assert found.status is (Status.OK if exposure == 1.0 else Status.SATURATED)
     # A camera that uses the levels above white is not cut off there.
     above = np.minimum(stored, 225) + np.random.default_rng(97).integers(0, 30, stored.shape).astype(np.uint8)

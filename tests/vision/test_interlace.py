@@ -8,13 +8,13 @@ import pytest
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 from tests.benchmarks.camera_artefacts import electronics as e
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX, NOISE, SIZE_PX, Shot, gripper, interlaced, plain
 from tests.benchmarks.camera_artefacts.optics import Surface, light_on_sensor
 from tests.benchmarks.camera_artefacts.scene import true_gap
 
-KNOWN = Settings(BELOW_PX, Direction.UP, other_response=None)
+KNOWN = Settings(BELOW_PX, Direction.UP, camera=LINEAR_CAMERA)
 
 
 def measured(shot: Shot, settings: Settings = KNOWN) -> GapMeasurement:

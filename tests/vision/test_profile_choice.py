@@ -13,14 +13,14 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.video_file import VideoFile
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 from fingervision.vision.profile_models import GLARE, SHADOW, STARTS_PX, STEP, WALL, fit_profile
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX, SIZE_PX, Shot, glare, motion, plain, shadow, wall
 from tests.benchmarks.camera_artefacts.electronics import stored
 from tests.benchmarks.camera_artefacts.optics import Surface, light_on_sensor
 from tests.benchmarks.camera_artefacts.scene import Finger, true_gap
 
-KNOWN = Settings(BELOW_PX, Direction.UP, other_response=None)
+KNOWN = Settings(BELOW_PX, Direction.UP, camera=LINEAR_CAMERA)
 SAMPLE = Path(__file__).parents[2] / "sample_frames" / "opening" / "opening.mp4"
 # Largest error a picture may have without saying so, and RMS over the few pictures of a test: three times what
 # `python -m tests.benchmarks.camera_artefacts --told` prints for hundreds.

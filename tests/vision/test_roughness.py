@@ -17,7 +17,7 @@ from fingervision.vision.gap import TOO_ROUGH
 from fingervision.vision.longer_flanks import is_surer
 from fingervision.vision.measuring_point import measuring_point, squared
 from fingervision.vision.outline_points import OutlinePoints
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 from fingervision.vision.roughness import Roughness, best_linear, roughness, with_roughness
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX, plain, texture
 from tests.benchmarks.camera_artefacts.optics import Surface
@@ -158,7 +158,7 @@ def test_flanks_too_short_to_tell_are_not_taken_for_smooth() -> None:
 
 def measured_plain() -> GapMeasurement:
     shot = plain(np.random.default_rng(1), Surface())
-    outcome = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, Direction.UP, other_response=None))
+    outcome = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, Direction.UP, camera=LINEAR_CAMERA))
     assert isinstance(outcome, GapMeasurement)
     assert outcome.roughness_px == 0.0
     return outcome
@@ -173,7 +173,7 @@ def test_a_printed_finger_is_as_sure_as_it_says(rough_px: float, rms_px: float) 
     errors, ratios = [], []
     for _ in range(12):
         shot = draw(rng)
-        outcome = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, Direction.UP, other_response=None))
+        outcome = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, Direction.UP, camera=LINEAR_CAMERA))
         if outcome == TOO_ROUGH:
             continue
         assert isinstance(outcome, GapMeasurement), outcome

@@ -9,11 +9,11 @@ from scipy.special import ndtr
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
-from fingervision.vision.pipeline import Settings, look_closely
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, look_closely
 from fingervision.vision.shared_profile import even_shift_px, flanks, shared_shift_px
 
 LIGHT = np.arange(256.0)
-SETTINGS = Settings(10.2, Direction.UP, other_response=None)
+SETTINGS = Settings(10.2, Direction.UP, camera=LINEAR_CAMERA)
 
 
 def drawn(seed: int, shift_px: float = 0.0, noise: float = 2.0) -> NDArray[np.uint8]:

@@ -12,7 +12,7 @@ from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 from tests.benchmarks.scenes.canvas import Canvas
 from tests.benchmarks.scenes.clutter import CLUTTER, Scene
 from tests.benchmarks.scenes.empty import DRAWN
@@ -103,7 +103,7 @@ def test_a_cut_that_ends_at_the_measuring_height_is_no_fillet() -> None:
         scene = Scene(np.random.default_rng([seed, 95]), is_cut=True, inner_corner_px=9.5, outer_corner_px=9.5)
         scene.paint()
         shot = scene.done()
-        found = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, other_response=None))
+        found = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, camera=LINEAR_CAMERA))
         assert isinstance(found, NoGap) or not is_wrong(shot, found)
 
 
@@ -116,7 +116,7 @@ def test_a_cut_finger_beside_a_round_one() -> None:
         scene.pair = cut, replace(own, is_cut=False, inner_corner_px=18.0, outer_corner_px=18.0)
         scene.paint()
         shot = scene.done()
-        found = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, other_response=None))
+        found = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, camera=LINEAR_CAMERA))
         assert isinstance(found, NoGap) or not is_wrong(shot, found)
         values += isinstance(found, GapMeasurement)
     assert values >= 4

@@ -25,7 +25,7 @@ from fingervision.gauges.straight_edge import (
 )
 from fingervision.storage.toml_section import Section
 from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle
-from fingervision.vision.response_shift import edge_shift_px
+from fingervision.vision.response_shift import u_edge_px
 from fingervision.vision.straight_edge_fit import reach_px
 from fingervision.vision.template_search import BEYOND_PX, Template
 
@@ -222,11 +222,7 @@ def _displaced_px(picture: Picture, found: Circle) -> float:
 
 def _u_response(picture: Picture, found: Circle) -> float:
     """Uncertainty of the outline's position due to an unknown camera response."""
-    other = picture.settings.other_response
-    if other is None:
-        return 0.0
     # The fit's levels are not kept; an outline of this contrast in the middle of the scale stands for it.
     share = min(abs(found.contrast) / picture.top, 1.0)
     levels = (0.5 - 0.5 * share, 0.5 + 0.5 * share)
-    shift: float = edge_shift_px(picture.settings.response, other, *levels, found.blur_px)
-    return abs(shift) / float(np.sqrt(3.0))
+    return u_edge_px(picture.settings.camera.response, *levels, found.blur_px)

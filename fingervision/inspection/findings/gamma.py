@@ -1,37 +1,37 @@
-"""Gamma: the camera's transfer curve is assumed and was not measured."""
+"""Gamma: the camera's transfer curve is assumed, or learnt from the shape of the edges, and was not measured."""
 
+from fingervision.domain.camera import Origin
 from fingervision.inspection.finding import Finding, weighed
-from fingervision.inspection.sample import SURELY, Sample
+from fingervision.inspection.sample import Sample
 
 REMEDY = (
     "Switch the camera's gamma off, or measure the response (`fingervision calibrate response`) and give it to "
     "calibrate and measure with --response."
 )
 FORMULA = (
-    "probability of the other response, from the shape of the edges, times the shift of the gap that it would cause"
+    "standard uncertainty of the gap due to the camera's response, as far as the shape of the edges leaves it open"
 )
 
 
 def find(sample: Sample) -> Finding | None:
-    """Judge from the shape of the edges which camera response was applied to the stored levels."""
-    seen = sample.response
-    if not seen.other:
-        words = f"The camera's response is known ({seen.assumed})."
-        return weighed(sample, "gamma", 0.0, words, "", FORMULA) if sample.looks else None
+    """State which camera response the shape of the edges shows, and what it leaves open."""
     if not sample.looks:
         return None
-    share = seen.share_other
-    cost_px = share * abs(seen.shift_px)
-    is_doubt = share < SURELY
-    if not 1.0 - SURELY < share < SURELY:
-        more_even = seen.other if share > 0.5 else seen.assumed
+    response = sample.settings.camera.response
+    if response.is_known:
+        words = f"The camera's response is known ({response.curve.name})."
+        return weighed(sample, "gamma", 0.0, words, "", FORMULA)
+    cost_px = sample.median(abs(look.outcome.u_response_px) for look in sample.looks)
+    if response.words:
+        figure = response.words
+    elif response.origin is Origin.LEARNT:
         figure = (
-            f"The shape of the edges is that of a camera with {more_even} levels; the levels are assumed to be "
-            f"{seen.assumed}, and the other response would change the gap by {abs(seen.shift_px):.2f} px."
+            f"The shape of the edges is that of a camera with {response.curve.name} levels, with which they are "
+            f"measured; what it leaves open changes the gap by {cost_px:.3f} px (standard uncertainty)."
         )
     else:
         figure = (
-            f"The shape of the edges does not distinguish {seen.assumed} from {seen.other} levels (probability of "
-            f"{seen.other}: {100 * share:.0f} %); the gap would change by {abs(seen.shift_px):.2f} px."
+            f"The levels are assumed to be {response.curve.name}; another response would change the gap by "
+            f"{cost_px:.2f} px (standard uncertainty)."
         )
-    return weighed(sample, "gamma", cost_px, figure, REMEDY, FORMULA, is_doubt=is_doubt)
+    return weighed(sample, "gamma", cost_px, figure, REMEDY, FORMULA, is_doubt=response.origin is Origin.ASSUMED)

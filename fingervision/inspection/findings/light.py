@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from fingervision.inspection.blocks import HEAVY
 from fingervision.inspection.finding import Finding, Severity, weighed, without
 from fingervision.inspection.findings.exposure import DIM, WANTED
-from fingervision.inspection.flank_profile import flank_profile
 from fingervision.inspection.ground_slope import ground_slope
 from fingervision.inspection.noise_bound import GOOD_NOISE
 from fingervision.inspection.plateaus import plateaus
-from fingervision.inspection.profile_fit import fit_step
+from fingervision.inspection.profile_fit import StepProfile, fit_step
 from fingervision.inspection.sample import Sample
+from fingervision.vision.flank_profiles import flank_profile
 
 Floats = NDArray[np.float64]
 
@@ -75,9 +75,16 @@ def _near_px(sample: Sample, light: Floats) -> float:
     seen = [(look.upright, look.edges) for look in sample.looks]
     moved = 0.0
     for side in range(2):
-        profile = flank_profile(seen, side, light)
-        if profile is None:
+        stored = flank_profile(seen, side, is_inner=True, top_level=sample.top_level)
+        if stored is None:
             return 0.0
+        levels = sample.top_level * stored.level
+        gain = np.interp(levels, np.arange(light.size), np.gradient(light))
+        profile = StepProfile(
+            stored.away_px,
+            np.interp(levels, np.arange(light.size), light),
+            np.maximum(sample.top_level * stored.u_level * gain, 1e-6),
+        )
         blur_px = sample.median(edges.blur_px[side, 0] for _, edges in seen)
         flat, sloping = (fit_step(profile, blur_px, sloping=slopes) for slopes in (False, True))
         # Slopes that do not improve the fit significantly are noise; small slopes are caused by a pattern or a codec.

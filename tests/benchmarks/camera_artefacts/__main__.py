@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from calib.camera_response import CameraResponse
+from fingervision.domain.camera import stated_camera
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement, NoGap
@@ -32,7 +33,7 @@ def measured(shot: Shot, told: bool) -> GapMeasurement | NoGap:
     coding = Coding.INTRAFRAME if shot.is_jpeg else Coding.LOSSLESS
     settings = Settings(BELOW_PX, Direction.UP)
     if told:
-        settings = replace(settings, response=RESPONSES[shot.transfer], other_response=None)
+        settings = replace(settings, camera=stated_camera(RESPONSES[shot.transfer]))
     return measure_frame(Frame(shot.picture, 0, coding=coding), settings)
 
 

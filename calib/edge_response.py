@@ -1,0 +1,401 @@
+"""Camera response from the shape of straight edges: the evidence for families of tone curves.
+
+The optics and the pixels blur light, and a symmetric blur gives an edge whose profile is odd about the edge in light,
+but not in the stored levels. Profiles of several edges are fitted at once, in light, for every family of tone curves;
+the evidence of each fit by Laplace's method (MacKay 2003, Information Theory, Inference and Learning Algorithms,
+chapter 27) gives the probability of the family. A single family with free parameters would not do: the curve
+F(l) = Phi(Phi^-1(l) + d) turns an edge into the same edge displaced by d sigma, so that the smoothness of few families
+decides, and the quality of the fit does not.
+
+The blur is a Gaussian with a disc (defocus) and a wider Gaussian (wings), all integrated over the pixel, and one skew
+(coma), whose side is fixed in the picture while that of a tone curve is fixed to the dark side of each edge.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from calib.camera_response import CURVES, CameraResponse, standard_response
+from calib.edge_profile import EdgeProfile
+
+Floats = NDArray[np.float64]
+
+# Levels (shares of full scale) at which the light of a family is tabulated.
+LEVELS = np.linspace(0.0, 1.0, 1025)
+# Radius of the disc and sigma of the wings, in sigmas of the Gaussian, and sigma (pixels) of the disc's own edge: that
+# of a pixel and of the diffraction beside it.
+DISC_RADIUS, WING_SIGMA, DISC_EDGE_PX = 2.0, 1.8, 0.58
+# Prior standard deviations: shares of disc and wings, skew (third moment over the cube of sigma), change of the light
+# of each plateau per pixel (share of the contrast), difference of an edge's ln sigma from the common one, ln sigma.
+U_DISC, U_WING, U_SKEW, U_SLOPE, U_UNLIKE, U_SIGMA = 0.5, 0.2, 0.5, 0.01, 0.03, 1.0
+# Prior probability of a linear camera; the other families share the rest. Machine vision cameras are linear, others
+# are not.
+LINEAR_PRIOR = 0.5
+# Least probability of a family that counts, and probability from which nothing else is averaged with a standard curve.
+LEAST_PROBABILITY, CERTAIN = 1e-3, 0.99
+# A profile is used over this multiple of the blur plus these pixels, to either side.
+REACH_SIGMAS, REACH_EXTRA_PX = 4.0, 3.0
+# Steps of the Levenberg-Marquardt fit, change of the cost below which it has converged, and step of the derivatives.
+MOST_STEPS, CONVERGED, STEP = 25, 0.02, 1e-4
+# Numbers of unknowns: common to all edges (ln sigma, disc, wings, skew), and of each edge (position, both plateaus as
+# levels, slopes of both, ln of its own sigma over the common one).
+SHARED, OWN = 4, 6
+
+HERMITE_X, HERMITE_W = np.polynomial.hermite_e.hermegauss(7)
+HERMITE_W = HERMITE_W / HERMITE_W.sum()
+ROOT_2PI = float(np.sqrt(2.0 * np.pi))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Family:
+    """A family of tone curves: light over level, with a Gaussian prior of its parameters.
+
+    Parameters
+    ----------
+    name : str
+        Name of the family.
+    light : callable
+        Light at `LEVELS` for a parameter vector, increasing; its scale is irrelevant.
+    mean, u : tuple of float
+        Prior means and standard deviations of the parameters.
+    """
+
+    name: str
+    light: Callable[[Floats], Floats]
+    mean: tuple[float, ...] = ()
+    u: tuple[float, ...] = ()
+
+
+def _log(p: Floats) -> Floats:
+    steepness = np.exp(p[0])
+    return np.asarray(np.expm1(LEVELS * np.log1p(steepness)) / steepness)
+
+
+def _power_series(p: Floats) -> Floats:
+    """Ln light = exp(p0) ln level + p1 (level - 1) + p2 (level^2 - 1)."""
+    exponent = np.exp(p[0]) * np.log(np.maximum(LEVELS, 1e-4)) + p[1] * (LEVELS - 1.0) + p[2] * (LEVELS**2 - 1.0)
+    return np.asarray(np.exp(np.minimum(exponent, 50.0)) * (LEVELS > 0.0))
+
+
+def _shoulder(p: Floats) -> Floats:
+    """A film's shoulder: light^n = h s / (1 + s - h), with h a power of the level."""
+    h, s = LEVELS ** np.exp(p[0]), np.exp(p[1])
+    return np.asarray((h * s / (1.0 + s - h)) ** np.exp(-p[2]))
+
+
+# Exponents of consumer cameras lie around 2 (Grossberg & Nayar 2004, doi:10.1109/TPAMI.2004.88), log profiles span five
+# to ten stops, and film curves have shoulders of every height.
+FAMILIES = (
+    Family("linear", lambda _: LEVELS),
+    Family("srgb", lambda _: CURVES["srgb"](LEVELS)),
+    Family("bt709", lambda _: CURVES["bt709"](LEVELS)),
+    Family("power", lambda p: np.asarray(LEVELS ** np.exp(p[0])), (0.5,), (0.4,)),
+    Family("log", _log, (3.5,), (1.2,)),
+    Family("power series", _power_series, (0.5, 0.0, 0.0), (0.4, 1.5, 1.0)),
+    Family("shoulder", _shoulder, (0.6, 0.7, 0.1), (0.3, 1.2, 0.25)),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FamilyFit:
+    """Fit of one family to all profiles.
+
+    Parameters
+    ----------
+    family : Family
+        The family.
+    parameters, covariance : ndarray of float, shapes (k,) and (k, k)
+        Parameters of the tone curve, and their covariance with everything else free.
+    shared, u_shared : ndarray of float, shape (SHARED,)
+        ln sigma, disc, wings, skew, and their standard uncertainties.
+    log_evidence : float
+        Logarithm of the evidence, up to a constant.
+    misfit : ndarray of float, shape (edges,)
+        Chi-square of each edge's bins, divided by their number less that of the unknowns of an edge.
+    rms_level : float
+        Root mean square of the residuals (share of full scale).
+    """
+
+    family: Family
+    parameters: Floats
+    covariance: Floats
+    shared: Floats
+    u_shared: Floats
+    log_evidence: float
+    misfit: Floats
+    rms_level: float
+
+    def response(self, parameters: Floats | None = None) -> CameraResponse:
+        """Tone curve of the fit, or of other parameters of its family."""
+        if not self.parameters.size:
+            return _fixed_response(self.family)
+        return _as_response(self.family, self.parameters if parameters is None else parameters)
+
+    def one_sigma(self) -> tuple[CameraResponse, ...]:
+        """Tone curves one standard deviation away along each principal axis of the parameters' covariance."""
+        if not self.parameters.size:
+            return ()
+        variance, axes = np.linalg.eigh(self.covariance)
+        steps = np.sqrt(np.clip(variance, 0.0, None)) * axes
+        return tuple(self.response(self.parameters + step) for step in steps.T)
+
+
+def fit_families(
+    profiles: Sequence[EdgeProfile], model_error: float, scale: float = 1.0, tagged: str = ""
+) -> list[FamilyFit]:
+    """Fit every family to profiles, the most probable one first.
+
+    Parameters
+    ----------
+    profiles : sequence of EdgeProfile
+        At least one profile.
+    model_error : float
+        Standard deviation of a bin about the best model, as a share of the contrast.
+    scale : float
+        Factor of all uncertainties.
+    tagged : str
+        Standard response that a tag of the file states, which becomes a further family; empty without one.
+    """
+    data = _Data.of(profiles, model_error, scale)
+    return sorted((_fit(family, data) for family in (*FAMILIES, *_tagged(tagged))), key=lambda fit: -fit.log_evidence)
+
+
+@cache
+def _tagged(name: str) -> tuple[Family, ...]:
+    if not name or any(family.name == name for family in FAMILIES):
+        return ()
+    return (Family(name, lambda _: np.interp(LEVELS, standard_response(name).level, standard_response(name).light)),)
+
+
+def probabilities(fits: Sequence[FamilyFit]) -> Floats:
+    """Posterior probability of each family."""
+    prior = np.array(
+        [LINEAR_PRIOR if fit.family.name == "linear" else (1.0 - LINEAR_PRIOR) / (len(fits) - 1) for fit in fits]
+    )
+    evidence = np.array([fit.log_evidence for fit in fits])
+    weight = prior * np.exp(evidence - evidence.max())
+    return np.asarray(weight / weight.sum())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResponsePosterior:
+    """Response that edges show, and what they leave open.
+
+    Parameters
+    ----------
+    curve : CameraResponse
+        Mean curve of the families; a standard one if it is practically certain, or the linear one if it is the most
+        probable.
+    others : tuple of (CameraResponse, float)
+        Other curves, each with the weight of the squared displacement of an edge in the variance of its position.
+    """
+
+    curve: CameraResponse
+    others: tuple[tuple[CameraResponse, float], ...]
+
+    @classmethod
+    def of(cls, fits: Sequence[FamilyFit]) -> "ResponsePosterior":
+        """Average over families, and over the parameters of each."""
+        likely = [(fit, float(p)) for fit, p in zip(fits, probabilities(fits), strict=True) if p > LEAST_PROBABILITY]
+        first, p_first = max(likely, key=lambda each: each[1])
+        if not first.parameters.size and (first.family.name == "linear" or p_first > CERTAIN):
+            curve = first.response()
+        else:
+            curve = curve_response(
+                first.family.name,
+                np.sum(
+                    [p * np.interp(LEVELS, r.level, r.light) for fit, p in likely for r in (fit.response(),)], axis=0
+                ),
+            )
+        others = [(fit.response(), p) for fit, p in likely if fit.response() is not curve]
+        return cls(curve, (*others, *((other, p) for fit, p in likely for other in fit.one_sigma())))
+
+
+def _light(response: CameraResponse) -> Floats:
+    return np.asarray(np.interp(LEVELS, response.level, response.light))
+
+
+@lru_cache(maxsize=32)
+def _fixed_response(family: Family) -> CameraResponse:
+    return standard_response(family.name)
+
+
+def _as_response(family: Family, parameters: Floats) -> CameraResponse:
+    return curve_response(family.name, _table(family, parameters))
+
+
+def curve_response(name: str, light: Floats) -> CameraResponse:
+    """Camera response of light tabulated at `LEVELS`."""
+    light = (light - light[0]) / (light[-1] - light[0])
+    light = np.maximum.accumulate(light) + 1e-9 * LEVELS
+    return CameraResponse(name, LEVELS, light / light[-1])
+
+
+def _table(family: Family, parameters: Floats) -> Floats:
+    light = family.light(parameters)
+    light = np.maximum.accumulate(light / light[-1])
+    return np.asarray(light + 1e-7 * LEVELS)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Data:
+    """Bins of all profiles in one array each."""
+
+    away: Floats
+    level: Floats
+    u: Floats
+    edge: NDArray[np.intp]
+    side: Floats
+    ends: Floats
+    sigma: float
+
+    @classmethod
+    def of(cls, profiles: Sequence[EdgeProfile], model_error: float, scale: float) -> "_Data":
+        sigma = float(np.median([_width(profile) for profile in profiles]))
+        reach = REACH_SIGMAS * sigma + REACH_EXTRA_PX
+        away, level, u, edge = [], [], [], []
+        for k, profile in enumerate(profiles):
+            near = np.abs(profile.away_px) < reach
+            away.append(profile.away_px[near])
+            level.append(profile.level[near])
+            u.append(scale * np.hypot(profile.u_level[near], model_error * profile.contrast))
+            edge.append(np.full(away[-1].size, k))
+        return cls(
+            np.concatenate(away),
+            np.concatenate(level),
+            np.concatenate(u),
+            np.concatenate(edge),
+            np.array([profile.side for profile in profiles]),
+            np.array([profile.ends for profile in profiles]),
+            sigma,
+        )
+
+    def start(self) -> Floats:
+        own = np.zeros((len(self.ends), OWN))
+        own[:, 1:3] = self.ends
+        return np.concatenate([[np.log(self.sigma), 0.0, 0.0, 0.0], own.ravel()])
+
+
+def _width(profile: EdgeProfile) -> float:
+    """Sigma of the edge from its steepest place: contrast / (sqrt(2 pi) slope)."""
+    slope = np.gradient(profile.level, profile.away_px)
+    steepest = float(np.median(np.sort(slope)[-3:]))
+    return max(profile.contrast / (ROOT_2PI * max(steepest, 1e-9)), 0.5)
+
+
+def _fit(family: Family, data: _Data) -> FamilyFit:
+    """Levenberg-Marquardt fit, and Laplace's evidence at its result."""
+    k, edges = len(family.mean), len(data.ends)
+    unknowns = np.concatenate([family.mean, data.start()])
+    prior_mean, prior_u = _priors(family, data)
+    precision = np.where(np.isfinite(prior_u), prior_u**-2.0, 0.0)
+    damping, residual = 1e-2, _residuals(family, data, unknowns[None])[0]
+    cost = _cost(residual, unknowns, prior_mean, precision)
+    hessian = np.eye(unknowns.size)
+    for _step in range(MOST_STEPS):
+        jacobian = _jacobian(family, data, unknowns, residual)
+        gradient = jacobian.T @ residual + precision * (unknowns - prior_mean)
+        hessian = jacobian.T @ jacobian + np.diag(precision + 1e-9)
+        gained = 0.0
+        while damping < 1e6:
+            step = np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), -gradient)
+            tried = unknowns + step
+            left = _residuals(family, data, tried[None])[0]
+            tried_cost = _cost(left, tried, prior_mean, precision)
+            if tried_cost < cost:
+                gained, unknowns, residual, cost = cost - tried_cost, tried, left, tried_cost
+                damping = max(0.1 * damping, 1e-9)
+                break
+            damping *= 10.0
+        if gained < CONVERGED:
+            break
+    covariance = np.asarray(np.linalg.pinv(hessian), dtype=np.float64)
+    evidence = -cost - 0.5 * float(np.linalg.slogdet(hessian)[1]) - float(np.sum(np.log(family.u)))
+    count = np.bincount(data.edge, minlength=edges)
+    chi = np.bincount(data.edge, residual**2, minlength=edges)
+    return FamilyFit(
+        family,
+        unknowns[:k],
+        covariance[:k, :k],
+        unknowns[k : k + SHARED],
+        np.sqrt(np.diag(covariance)[k : k + SHARED]),
+        evidence,
+        chi / np.maximum(count - OWN, 1).astype(np.float64),
+        float(np.sqrt(np.mean((residual * data.u) ** 2))),
+    )
+
+
+def _priors(family: Family, data: _Data) -> tuple[Floats, Floats]:
+    """Means and standard deviations of all unknowns; infinite for the position and the plateaus."""
+    own = np.array([np.inf, np.inf, np.inf, U_SLOPE, U_SLOPE, U_UNLIKE])
+    shared_u = np.array([U_SIGMA, U_DISC, U_WING, U_SKEW])
+    mean = np.concatenate([family.mean, [np.log(data.sigma), 0.0, 0.0, 0.0], np.zeros(OWN * len(data.ends))])
+    return mean, np.concatenate([family.u, shared_u, np.tile(own, len(data.ends))])
+
+
+def _cost(residual: Floats, unknowns: Floats, mean: Floats, precision: Floats) -> float:
+    return float(0.5 * (residual @ residual + precision @ (unknowns - mean) ** 2))
+
+
+def _jacobian(family: Family, data: _Data, unknowns: Floats, residual: Floats) -> Floats:
+    """Derivatives of the residuals; an unknown of one edge moves that edge alone, so that all edges move at once."""
+    common, edges = len(family.mean) + SHARED, len(data.ends)
+    moved = np.repeat(unknowns[None], common + OWN, axis=0)
+    moved[np.arange(common), np.arange(common)] += STEP
+    for j in range(OWN):
+        moved[common + j, common + j :: OWN] += STEP
+    change = (_residuals(family, data, moved) - residual) / STEP
+    jacobian = np.zeros((residual.size, unknowns.size))
+    jacobian[:, :common] = change[:common].T
+    for e in range(edges):
+        mine = data.edge == e
+        jacobian[mine, common + OWN * e : common + OWN * (e + 1)] = change[common:, mine].T
+    return jacobian
+
+
+def _residuals(family: Family, data: _Data, sets: Floats) -> Floats:
+    """Measured minus modelled level of every bin, in its standard uncertainties, for each set of unknowns."""
+    k, edges = len(family.mean), len(data.ends)
+    shared = sets[:, k : k + SHARED, None]
+    own = sets[:, k + SHARED :].reshape(len(sets), edges, OWN)
+    at, dark, light, slope_dark, slope_light, unlike = (own[:, :, j][:, data.edge] for j in range(OWN))
+    x = data.away - at
+    step = _step(x, np.exp(shared[:, 0] + unlike), shared[:, 1], shared[:, 2], shared[:, 3] * data.side[data.edge])
+    share = step + slope_dark * np.minimum(x, 0.0) * (1.0 - step) + slope_light * np.maximum(x, 0.0) * step
+    out = np.empty_like(x)
+    table, before = LEVELS, None
+    for i, one in enumerate(sets):
+        if before is None or not np.array_equal(one[:k], before):
+            table, before = _table(family, one[:k]), one[:k]
+        ends = np.interp(np.stack([dark[i], light[i]]), LEVELS, table)
+        out[i] = np.interp(ends[0] + (ends[1] - ends[0]) * share[i], table, LEVELS)
+    return np.asarray((out - data.level) / data.u)
+
+
+def _step(x: Floats, sigma: Floats, disc: Floats, wing: Floats, skew: Floats) -> Floats:
+    """Edge spread function: Gaussian, disc and wings, integrated over the pixel, with a skew (Edgeworth's term)."""
+    z = x / sigma
+    skewed = -skew / (6.0 * ROOT_2PI) * (z**2 - 1.0) * np.exp(-0.5 * z**2)
+    gauss, wide = _over_pixel(x, sigma), _over_pixel(x, WING_SIGMA * sigma)
+    return np.asarray((1.0 - disc - wing) * gauss + disc * _disc(x, DISC_RADIUS * sigma) + wing * wide + skewed)
+
+
+def _over_pixel(x: Floats, sigma: Floats) -> Floats:
+    """Normal distribution integrated over a pixel about x."""
+    ends = [
+        each * ndtr(each / sigma) + sigma / ROOT_2PI * np.exp(-0.5 * (each / sigma) ** 2) for each in (x + 0.5, x - 0.5)
+    ]
+    return np.asarray(ends[0] - ends[1])
+
+
+def _disc(x: Floats, radius: Floats) -> Floats:
+    """Edge spread of a uniform disc, smoothed by the pixel (Gauss-Hermite quadrature)."""
+    total = np.zeros_like(x)
+    for node, weight in zip(HERMITE_X, HERMITE_W, strict=True):
+        u = np.clip((x + node * DISC_EDGE_PX) / radius, -1.0, 1.0)
+        total += weight * (0.5 + (u * np.sqrt(1.0 - u * u) + np.arcsin(u)) / np.pi)
+    return total

@@ -1,0 +1,98 @@
+"""Mean profiles of stored levels across the four straight flanks, from all frames with their sub-pixel phases."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.edge_profile import EdgeProfile, binned_profile
+from fingervision.vision.edges import EdgePoints
+from fingervision.vision.grey import GreyImage
+from fingervision.vision.profile_lines import INNER, ROWS
+
+Floats = NDArray[np.float64]
+
+# Extent of a profile to either side: this multiple of the blur plus these pixels, at most the last number of pixels,
+# and at most half of the distance to the next edge.
+REACH_SIGMAS, REACH_EXTRA_PX, FARTHEST_PX = 4.0, 4.0, 20
+# Largest scatter of the rows about a straight line (pixels), and fewest fitted rows, in the part far from the tip.
+STRAIGHT_PX, FEWEST_ROWS = 0.4, 6
+
+Seen = tuple[GreyImage, EdgePoints]
+
+
+def flank_profiles(seen: Sequence[Seen], top_level: int) -> list[EdgeProfile]:
+    """Profiles of the inner and outer flanks of both fingers, as far as they are straight and in view.
+
+    Parameters
+    ----------
+    seen : sequence of (ndarray, EdgePoints)
+        Pictures turned so that the tips point up, and the edges fitted in them.
+    top_level : int
+        Full scale of the pictures.
+    """
+    found = (
+        flank_profile(seen, finger, is_inner=is_inner, top_level=top_level)
+        for finger in range(2)
+        for is_inner in (True, False)
+    )
+    return [profile for profile in found if profile is not None]
+
+
+def flank_profile(seen: Sequence[Seen], finger: int, *, is_inner: bool, top_level: int) -> EdgeProfile | None:
+    """Profile of one flank of the left (0) or right (1) finger; None if it is too short, bent, or out of view."""
+    part = slice(0, INNER) if is_inner else slice(INNER, ROWS)
+    gathered = [each for upright, edges in seen if (each := _one(upright, edges, finger, part)) is not None]
+    if not gathered:
+        return None
+    away = np.concatenate([found for found, _ in gathered])
+    level = np.concatenate([stored for _, stored in gathered]) / top_level
+    frame = np.repeat(np.arange(len(gathered)), [found.size for found, _ in gathered])
+    outward = float(seen[0][1].lines.outward[finger, part][0])
+    return binned_profile(away, level, frame, 1.0 / top_level, outward, is_outer=not is_inner)
+
+
+def _one(upright: GreyImage, edges: EdgePoints, finger: int, part: slice) -> tuple[Floats, Floats] | None:
+    """Distances outwards from the flank's line, and stored levels, of one picture."""
+    real = np.flatnonzero(edges.lines.weight[finger, part] > 0)
+    rows = real[real.size // 2 :]
+    if rows.size < FEWEST_ROWS:
+        return None
+    fixed, found = edges.lines.fixed[finger, part][rows].astype(float), edges.position[finger, part][rows]
+    slope, at = np.polyfit(fixed, found, 1)
+    off = np.abs(found - at - slope * fixed)
+    spread = 1.4826 * float(np.median(off))
+    if spread > STRAIGHT_PX:
+        return None
+    keep = off < 3.0 * max(spread, 0.02)
+    if np.count_nonzero(keep) < FEWEST_ROWS:
+        return None
+    slope, at = np.polyfit(fixed[keep], found[keep], 1)
+    outward = int(edges.lines.outward[finger, part][0])
+    every = np.arange(int(fixed.min()), int(fixed.max()) + 1)
+    line = at + slope * every
+    room = _room_px(upright, edges, line)
+    sigma = float(edges.blur_px[finger, 0])
+    reach = int(min(REACH_SIGMAS * sigma + REACH_EXTRA_PX, FARTHEST_PX, room))
+    if reach < REACH_SIGMAS * sigma:
+        return None
+    columns = np.rint(line).astype(int)[:, None] + outward * np.arange(-reach, reach + 1)
+    inside = (columns >= 0) & (columns < upright.shape[1])
+    levels = upright[np.broadcast_to(every[:, None], columns.shape)[inside], columns[inside]]
+    cosine = float(1.0 / np.hypot(1.0, slope))
+    return (outward * (columns - line[:, None]) * cosine)[inside], levels.astype(np.float64)
+
+
+def _room_px(upright: GreyImage, edges: EdgePoints, line: Floats) -> float:
+    """Half of the smallest distance from the middle of a flank to another flank."""
+    middle = float(np.median(line))
+    room = float(FARTHEST_PX)
+    for finger in range(2):
+        for part in (slice(0, INNER), slice(INNER, ROWS)):
+            mine = edges.lines.weight[finger, part] > 0
+            if not mine.any():
+                continue
+            apart = abs(float(np.median(edges.position[finger, part][mine])) - middle)
+            if apart > 2.0:
+                room = min(room, 0.5 * apart)
+    return room

@@ -1,0 +1,152 @@
+"""Learn a camera's response and point spread from the straight flanks in some frames of a recording."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calib.camera_response import CURVES, standard_response
+from calib.edge_profile import EdgeProfile
+from calib.edge_response import FamilyFit, ResponsePosterior, fit_families
+from fingervision.domain.camera import (
+    CameraModel,
+    CameraQuantity,
+    Origin,
+    OtherResponse,
+    PointSpread,
+    ResponseEstimate,
+)
+from fingervision.domain.frame import Coding
+from fingervision.vision.flank_profiles import Seen, flank_profiles
+
+# Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
+MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.01}
+# Ratio of the residuals to their uncertainty above which no family explains the edges.
+MOST_MISFIT = 1.3
+# Overshoot of an edge (share of its contrast) above which the camera sharpens: sharpening after the tone curve makes
+# the profile even in the levels, and so imitates another response at a perfect fit.
+MOST_OVERSHOOT = 0.03
+# Negative share of the point spread's wings from which the camera sharpens: no optics takes light away.
+# A skewed point spread (coma) has such a share as well, since its long side is no Gaussian.
+NEGATIVE_WING, COMA = 0.08, 0.15
+# Least contrast of a flank (share of full scale) within which a curve can be seen, and levels beyond which it is
+# clipped.
+LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
+# Share of a curve's displacement of an edge that is added to the uncertainty for curves of no family: their error in
+# recordings of log, film and S-curves (tests/benchmarks/unknown_cameras.py).
+FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15, Coding.INTERFRAME: 0.3}
+# Least weight of another curve beside a linear one: the smoothing of a codec that predicts from other pictures hides a
+# curve in one of ten recordings, and the whole displacement is then the error (2 u with u^2 = 1/4).
+LEAST_UNLIKE_LINEAR = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.0, Coding.INTERFRAME: 0.25}
+
+REMEDY = "calibrate with bars of three widths, give the curve with --response, or switch the picture profile off"
+NO_FLANKS = (
+    "The camera's response could not be learnt, because no straight flank of a finger shows both its plateaus "
+    f"unclipped and with enough contrast: u_shift_px contains another usual response. Lower the exposure, or {REMEDY}."
+)
+SHARPENED = (
+    "The camera sharpens its pictures (its point spread has negative wings, {share:.0%} of the light), which hides its "
+    "tone curve: nothing is corrected, and u_shift_px contains a usual tone curve. Switch sharpening off, or "
+    f"{REMEDY}."
+)
+MISFIT = (
+    "The shape of the edges is that of no usual tone curve (the residuals are {misfit:.1f} times their uncertainty), "
+    f"as after local tone mapping: nothing is corrected, and u_shift_px contains a usual tone curve; {REMEDY}."
+)
+
+
+def learnt_camera(seen: Sequence[Seen], prior: CameraModel, top_level: int, coding: Coding) -> CameraModel:
+    """Camera with the response and the point spread that straight flanks show.
+
+    Parameters
+    ----------
+    seen : sequence of (ndarray, EdgePoints)
+        Pictures turned so that the tips point up, and the edges fitted in them.
+    prior : CameraModel
+        The camera before; its response is kept if it is known.
+    top_level : int
+        Full scale of the pictures.
+    coding : Coding
+        Compression of the pictures.
+
+    Returns
+    -------
+    CameraModel
+        The prior with a learnt response; or with the assumed one and a sentence on why it could not be learnt.
+    """
+    profiles = [profile for profile in flank_profiles(seen, top_level) if _is_usable(profile)]
+    return learnt_from_profiles(profiles, prior, coding)
+
+
+def learnt_from_profiles(profiles: list[EdgeProfile], prior: CameraModel, coding: Coding) -> CameraModel:
+    """Camera as the mean profiles of unclipped flanks show it; see `learnt_camera`."""
+    if not profiles:
+        return _not_learnt(prior, NO_FLANKS, 1.0 / 3.0)
+    overshoot = float(np.median([profile.overshoot for profile in profiles]))
+    prior = replace(prior, sharpening=CameraQuantity(overshoot, MODEL_ERROR[coding], Origin.LEARNT))
+    if overshoot > MOST_OVERSHOOT:
+        return _not_learnt(prior, SHARPENED.format(share=overshoot), 1.0)
+    assumed = prior.response.curve
+    fits, misfit = _fitted(profiles, MODEL_ERROR[coding], assumed.name if assumed.name in CURVES else "")
+    if misfit > MOST_MISFIT:
+        return _not_learnt(prior, MISFIT.format(misfit=misfit), 1.0)
+    best = fits[0]
+    wing, u_wing = float(best.shared[2]), float(best.u_shared[2])
+    if wing < -max(NEGATIVE_WING, 2.0 * u_wing) and abs(float(best.shared[3])) < COMA:
+        return _not_learnt(prior, SHARPENED.format(share=-wing), 1.0)
+    camera = replace(
+        prior,
+        point_spread=_point_spread(best),
+        discrepancy=CameraQuantity(max(misfit, 1.0) * MODEL_ERROR[coding], None, Origin.LEARNT),
+    )
+    if prior.response.is_known:
+        return camera
+    response = _response(fits, coding)
+    if response.curve.white != assumed.white:  # a video of studio range stays clipped at its white
+        response = replace(response, curve=replace(response.curve, white=assumed.white))
+    return replace(camera, response=response)
+
+
+def _is_usable(profile: EdgeProfile) -> bool:
+    dark, light = profile.ends
+    return profile.contrast > LEAST_CONTRAST and dark > CLIPPED[0] and light < CLIPPED[1]
+
+
+def _fitted(profiles: list[EdgeProfile], model_error: float, tagged: str) -> tuple[list[FamilyFit], float]:
+    """Fits of all flanks; of the outer ones alone if the inner ones, which side walls spoil, do not agree with them."""
+    fits = fit_families(profiles, model_error, tagged=tagged)
+    misfit = _misfit(fits)
+    outer = [profile for profile in profiles if profile.is_outer]
+    if misfit > MOST_MISFIT and 0 < len(outer) < len(profiles):
+        fits = fit_families(outer, model_error, tagged=tagged)
+        misfit = _misfit(fits)
+    return fits, misfit
+
+
+def _misfit(fits: Sequence[FamilyFit]) -> float:
+    return float(np.sqrt(np.mean(fits[0].misfit)))
+
+
+def _response(fits: Sequence[FamilyFit], coding: Coding) -> ResponseEstimate:
+    """Response of the fits, with what they leave open and what they do not know."""
+    found = ResponsePosterior.of(fits)
+    others = [OtherResponse(other, weight) for other, weight in found.others]
+    if found.curve is not standard_response("linear"):
+        others.append(OtherResponse(standard_response("linear"), FOREIGN_CURVE[coding] ** 2))
+    elif (left := LEAST_UNLIKE_LINEAR[coding] - sum(other.weight for other in others)) > 0.0:
+        others.append(OtherResponse(standard_response("srgb"), left))
+    return ResponseEstimate(found.curve, tuple(others), Origin.LEARNT)
+
+
+def _point_spread(fit: FamilyFit) -> PointSpread:
+    sigma = float(np.exp(fit.shared[0]))
+    disc, wing, skew = (float(each) for each in fit.shared[1:])
+    return PointSpread(CameraQuantity(sigma, sigma * float(fit.u_shared[0]), Origin.LEARNT), disc, wing, skew)
+
+
+def _not_learnt(prior: CameraModel, words: str, weight: float) -> CameraModel:
+    """Prior camera with a sentence; a camera that processes its pictures surely has a tone curve (weight 1)."""
+    if prior.response.is_known:
+        return prior
+    others = tuple(replace(other, weight=max(other.weight, weight)) for other in prior.response.others)
+    return replace(prior, response=replace(prior.response, others=others, words=words))

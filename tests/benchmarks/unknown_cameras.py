@@ -1,0 +1,264 @@
+"""Error and coverage of the gap over recordings of cameras about which nothing is stated, class by class.
+
+    python -m tests.benchmarks.unknown_cameras [--recordings 8] [--frames 20] [--seed 1] [--only NAME...]
+
+Every recording is measured as `measure --px-per-mm` does, without any option. Fingers, optics and cameras are drawn
+here and in `camera_artefacts`, and share nothing with the product. The light of a recording is the same for all
+classes, so that classes differ by their cameras alone. Columns: RMS of the error of `gap_px`; RMS of the recordings'
+mean errors; median expanded uncertainty (k = 2) from both parts; its ratio to the RMS error; share of errors within
+2 u; share beyond 0.25 px and beyond 2 u (wrong and not said); frames without a gap; responses that the recordings were
+measured with.
+"""
+
+import argparse
+import io
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import av
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.calibration import BareScale
+from fingervision.domain.direction import Direction
+from fingervision.domain.frame import Coding, Frame
+from fingervision.domain.gap import GapMeasurement
+from fingervision.frames.source import Description
+from fingervision.measuring.in_memory import measure_in_memory
+from fingervision.measuring.task import Task
+from tests.benchmarks.camera_artefacts.classes import BELOW_PX, SIZE_PX, gripper
+from tests.benchmarks.camera_artefacts.optics import Surface, light_on_sensor
+from tests.benchmarks.camera_artefacts.scene import true_gap
+
+Floats = NDArray[np.float64]
+Pictures = list[NDArray[np.uint8]]
+Curve = Callable[[Floats], Floats]
+
+PX_PER_MM = 34.0
+
+
+def srgb(light: Floats) -> Floats:
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
+
+
+def bt709(light: Floats) -> Floats:
+    return np.where(light < 0.018, 4.5 * light, 1.099 * np.maximum(light, 1e-9) ** 0.45 - 0.099)
+
+
+def log_profile(light: Floats) -> Floats:
+    """Curve of a camera's log profile: logarithm of the light above an offset."""
+    return np.asarray(0.09 + 0.85 * np.log1p(60.0 * light) / np.log1p(60.0))
+
+
+def shoulder(light: Floats) -> Floats:
+    """Filmic tone curve (Hable 2010, the film curve of Uncharted 2), with a display's gamma."""
+
+    def film(x: Floats | float) -> Floats:
+        a, b, c, d, e, f = 0.22, 0.30, 0.10, 0.20, 0.01, 0.30
+        return np.asarray((x * (a * x + c * b) + d * e) / (x * (a * x + b) + d * f) - e / f)
+
+    return np.asarray((film(4.0 * light) / film(4.0)) ** (1.0 / 2.2))
+
+
+def s_curve(light: Floats) -> Floats:
+    """A phone's contrast curve: sRGB levels, mixed half and half with a smooth step."""
+    v = srgb(light)
+    return np.asarray(0.5 * v + 0.5 * v * v * (3.0 - 2.0 * v))
+
+
+CURVES: dict[str, Curve] = {
+    "linear": lambda light: light,
+    "srgb": srgb,
+    "bt709": bt709,
+    "power-2.2": lambda light: np.asarray(light ** (1 / 2.2)),
+    "power-1.5": lambda light: np.asarray(light ** (1 / 1.5)),
+    "log": log_profile,
+    "shoulder": shoulder,
+    "s-curve": s_curve,
+}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Light on the sensor in every frame, with the true gap."""
+
+    light: tuple[Floats, ...]
+    gap_px: tuple[float, ...]
+    seed: int
+
+
+@dataclass(frozen=True)
+class Film:
+    """Pictures with their coding, as a frame source."""
+
+    pictures: tuple[NDArray[np.uint8], ...]
+    coding: Coding
+
+    @property
+    def description(self) -> Description:
+        height, width = self.pictures[0].shape
+        return Description("drawn", "images", "raw", self.coding, width, height, 25.0, True, len(self.pictures))
+
+    def __iter__(self) -> Iterator[Frame]:
+        for index, picture in enumerate(self.pictures):
+            yield Frame(picture, index, 0.04 * index, self.coding)
+
+
+def drawn(seed: int, frames: int, surface: Surface = Surface(), blur_px: float | None = None) -> Recording:  # noqa: B008
+    rng = np.random.default_rng([seed, 7])
+    left, right = gripper(rng)
+    surface = replace(surface, ground=rng.uniform(0.55, 0.8), finger=rng.uniform(0.02, 0.12))
+    sigma = blur_px or rng.uniform(0.8, 1.4)
+    rates = rng.uniform(-0.3, 0.3, 2)
+    light, gaps = [], []
+    for k in range(frames):
+        pair = tuple(
+            replace(finger, across_px=finger.across_px + rate * k)
+            for finger, rate in zip((left, right), rates, strict=True)
+        )
+        light.append(light_on_sensor(pair, surface, sigma, SIZE_PX, rng))
+        gaps.append(true_gap(*pair, BELOW_PX))
+    return Recording(tuple(light), tuple(gaps), seed)
+
+
+def exposed(light: Floats, rng: np.random.Generator) -> Floats:
+    """Shot noise of 8000 electrons at full scale, and read noise of 12 electrons."""
+    sigma = np.sqrt(np.maximum(light, 0.0) / 8000.0 + (12.0 / 8000.0) ** 2)
+    return np.asarray(np.clip(light + sigma * rng.standard_normal(light.shape), 0.0, 1.0))
+
+
+def stored(levels: Floats) -> NDArray[np.uint8]:
+    return np.clip(np.rint(255.0 * levels), 0, 255).astype(np.uint8)
+
+
+def lossless(recording: Recording, curve: Curve) -> Film:
+    rng = np.random.default_rng([recording.seed, 11])
+    return Film(tuple(stored(curve(exposed(light, rng))) for light in recording.light), Coding.LOSSLESS)
+
+
+def jpeg(recording: Recording, curve: Curve, quality: int = 85, amount: float = 0.0) -> Film:
+    rng = np.random.default_rng([recording.seed, 11])
+    pictures = []
+    for light in recording.light:
+        levels = curve(exposed(light, rng))
+        if amount:
+            levels = levels + amount * (levels - cv2.GaussianBlur(levels, (0, 0), 1.0))
+        _, coded = cv2.imencode(".jpg", stored(levels), [cv2.IMWRITE_JPEG_QUALITY, quality])
+        pictures.append(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE))
+    return Film(tuple(pictures), Coding.INTRAFRAME)
+
+
+def h264(recording: Recording, curve: Curve, crf: int = 20) -> Film:
+    pictures = lossless(recording, curve).pictures
+    buffer = io.BytesIO()
+    with av.open(buffer, "w", format="matroska") as container:
+        stream = container.add_stream("libx264", rate=25, options={"crf": str(crf), "preset": "medium"})
+        stream.height, stream.width = pictures[0].shape
+        stream.pix_fmt = "yuv420p"
+        for picture in pictures:
+            frame = av.VideoFrame.from_ndarray(picture, format="gray").reformat(
+                format="yuv420p", src_color_range=2, dst_color_range=2
+            )
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    buffer.seek(0)
+    with av.open(buffer) as container:
+        seen = tuple(frame.to_ndarray()[: pictures[0].shape[0]] for frame in container.decode(video=0))
+    return Film(tuple(np.ascontiguousarray(picture) for picture in seen), Coding.INTERFRAME)
+
+
+def coma(recording: Recording, curve: Curve) -> Film:
+    """Light that a lens smears to the right."""
+    kernel = np.array([[0.0, 0.0, 0.0, 0.72, 0.18, 0.07, 0.03]])
+    smeared = tuple(
+        cv2.filter2D(light, -1, kernel[:, ::-1], borderType=cv2.BORDER_REPLICATE) for light in recording.light
+    )
+    centre = float((kernel[0] * np.arange(-3, 4)).sum())
+    moved = np.array([[1.0, 0.0, -centre], [0.0, 1.0, 0.0]])
+    size = recording.light[0].shape[::-1]
+    back = tuple(
+        cv2.warpAffine(light, moved, size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE) for light in smeared
+    )
+    return lossless(replace(recording, light=back), curve)
+
+
+def defocused(recording: Recording, curve: Curve) -> Film:
+    """Disc of 2.5 px radius."""
+    y, x = np.mgrid[-3:4, -3:4]
+    disc = np.clip(3.0 - np.hypot(x, y), 0.0, 1.0)
+    blurred = tuple(
+        cv2.filter2D(light, -1, disc / disc.sum(), borderType=cv2.BORDER_REPLICATE) for light in recording.light
+    )
+    return lossless(replace(recording, light=blurred), curve)
+
+
+CLASSES: dict[str, Callable[[Recording], Film]] = {
+    **{name: partial(lossless, curve=curve) for name, curve in CURVES.items()},
+    "linear-coma": partial(coma, curve=CURVES["linear"]),
+    "srgb-coma": partial(coma, curve=srgb),
+    "linear-defocus": partial(defocused, curve=CURVES["linear"]),
+    "srgb-defocus": partial(defocused, curve=srgb),
+    "linear-h264": partial(h264, curve=CURVES["linear"]),
+    "srgb-h264": partial(h264, curve=srgb),
+    "bt709-h264": partial(h264, curve=bt709),
+    "linear-jpeg": partial(jpeg, curve=CURVES["linear"]),
+    "srgb-jpeg": partial(jpeg, curve=srgb),
+    "phone": partial(jpeg, curve=s_curve, amount=0.5),
+}
+SURFACES = {
+    "": Surface(),
+    "shadow": Surface(shadow=0.2),
+    "wall": Surface(wall_px=2.0),
+    "glare": Surface(glare=0.4),
+}
+
+
+def row(name: str, recordings: Sequence[Recording], camera: Callable[[Recording], Film]) -> str:
+    error, u, means, lost = [], [], [], 0
+    responses: Counter[str] = Counter()
+    task = Task(BareScale(PX_PER_MM), below_tip_mm=BELOW_PX / PX_PER_MM, direction=Direction.UP)
+    for recording in recordings:
+        found = measure_in_memory(camera(recording), task)
+        responses[str(found.summary["settings"]["response"])] += 1
+        mine = []
+        for result, gap_px in zip(found.results, recording.gap_px, strict=True):
+            if isinstance(result.outcome, GapMeasurement):
+                mine.append(result.outcome.gap_px - gap_px)
+                u.append(np.hypot(result.outcome.u_gap_px, result.outcome.u_picture_px))
+            else:
+                lost += 1
+        error += mine
+        means += [np.mean(mine)] if mine else []
+    if not error:
+        return f"{name:16s} {lost} refused"
+    e, twice = np.array(error), 2.0 * np.array(u)
+    rms = np.sqrt(np.mean(e**2))
+    silent = (np.abs(e) > 0.25) & (np.abs(e) > twice)
+    return (
+        f"{name:16s} {rms:7.4f} {np.sqrt(np.mean(np.square(means))):8.4f} {np.median(twice):7.4f} "
+        f"{np.median(twice) / rms:6.1f} {100 * np.mean(np.abs(e) < twice):6.1f} {100 * silent.mean():7.1f} {lost:5d}  "
+        f"{dict(responses)}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--recordings", type=int, default=8)
+    parser.add_argument("--frames", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", nargs="*", choices=list(CLASSES))
+    parser.add_argument("--surface", choices=list(SURFACES), default="", help="what lies beside the edges")
+    options = parser.parse_args()
+    recordings = [
+        drawn(1000 * options.seed + k, options.frames, SURFACES[options.surface]) for k in range(options.recordings)
+    ]
+    print("class             RMS px  of means   U px  U/RMS   <2u %  silent%  lost  responses")
+    for name in options.only or CLASSES:
+        print(row(name, recordings, CLASSES[name]), flush=True)
+
+
+if __name__ == "__main__":
+    main()
