@@ -7,6 +7,7 @@ hardware.
 
 import re
 from math import inf
+from pathlib import Path
 
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import RefusedError
@@ -15,10 +16,10 @@ from fingervision.testbed.actuators._single_axis import (
     AxisSettings,
     SingleAxis,
     stated_axis,
-    without_hardware,
 )
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.motion.move_limits import FreeMoves
 from fingervision.testbed.text_protocol import line
 from fingervision.testbed.text_protocol.line import Line, opened_line
 from fingervision.testbed.text_protocol.words import Exchange, Words, number_in, words_of
@@ -117,6 +118,12 @@ class TextStage(SingleAxis):
             answer = self._talk.ask(self._actions["check"])
             if answer.re.groups and answer[1]:
                 raise RefusedError("refused", answer[1])
+
+
+def without_hardware(section: Section, folder: Path) -> FreeMoves:
+    """Limits of the stage, and a check of its words, without opening the port."""
+    words_of(section, folder, NEEDED)
+    return FreeMoves(stated_axis(section).limits)
 
 
 def build(section: Section, context: BuildContext) -> TextStage:

@@ -4,6 +4,7 @@ The format is explained in the manual (docs/how_to/stages.md); the files of the 
 """
 
 import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -173,6 +174,8 @@ def _exchange(top: Section, table: Section, settings: Mapping[str, Any], keys: t
             table.refuse(
                 "say", f"must have no placeholders but {known}, each as {{to:.4f}}, but is {line!r} ({error})."
             )
+    if "moving" in keys and "moving_bits" not in table.values:
+        _pattern(table, "moving", settings)
     for key in ("per_mm", "speed_per_mm_s"):
         if isinstance(table.values.get(key), str):
             table.word(key, of=tuple(settings))
@@ -194,8 +197,10 @@ def _pattern(section: Section, key: str, settings: Mapping[str, Any]) -> re.Patt
     words = section.word(key)
     given = {name: re.escape(str(value)) for name, value in settings.items()}
     try:
-        return re.compile(NAME.sub(lambda found: given.get(found[1], found[0]), words))
-    except re.error as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # an expression that a later Python reads otherwise
+            return re.compile(NAME.sub(lambda found: given.get(found[1], found[0]), words))
+    except (re.error, FutureWarning) as error:
         section.refuse(key, f"must be a regular expression, but is {words!r} ({error}).")
 
 

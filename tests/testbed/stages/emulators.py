@@ -298,6 +298,64 @@ class NewportEsp(Emulator):
         return []
 
 
+class Conex(Emulator):
+    """Newport CONEX-CC: two letters and a value, states as hexadecimal numbers, errors as letters."""
+
+    error = "@"
+
+    def answer(self, line: str) -> list[str]:
+        plant, name, value = self.plant, line[1:3], line[3:].strip()
+        match name:
+            case "ID":
+                return ["1IDTRA12CC"]
+            case "TP":
+                return [f"1TP{plant.at():.6g}"]
+            case "TS":
+                state = ("1E" if plant.homing else "28") if plant.moves else "33" if plant.homed else "0A"
+                return [f"1TS0000{state}"]
+            case "TE":
+                error, self.error = self.error, "@"
+                return [f"1TE{error}"]
+            case "VA":
+                plant.speed = float(value)
+            case "PA" if plant.homed:
+                plant.homing = False
+                plant.go(float(value))
+            case "OR":
+                plant.homed = plant.homing = True
+                plant.go(0.0, 5.0)
+            case "ST":
+                plant.halt()
+            case _:
+                self.error = "H"  # not allowed before the reference was found
+        return []
+
+
+class Invented(Emulator):
+    """The invented controller of the manual's page on stages: micrometres, every command is answered."""
+
+    def answer(self, line: str) -> list[str]:
+        plant, words = self.plant, line.strip().split()
+        match words:
+            case ["1ID?"]:
+                return ["INVENTED STAGE 1.0"]
+            case ["1POS?"]:
+                return [f"{plant.at() * 1000.0:.3f}"]
+            case ["1STATE?"]:
+                return ["MOVE" if plant.moves else "IDLE"]
+            case ["1SPEED", speed]:
+                plant.speed = float(speed) / 1000.0
+            case ["1GOTO", to]:
+                plant.go(float(to) / 1000.0)
+            case ["1HOME"]:
+                plant.go(0.0, 5.0)
+            case ["1STOP"]:
+                plant.halt()
+            case _:
+                return ["ERR unknown command"]
+        return ["OK"]
+
+
 class Meter(Emulator):
     """A multimeter or a balance: it answers SCPI's READ? and MT-SICS' SI, as slowly as it is told."""
 

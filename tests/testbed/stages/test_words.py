@@ -1,0 +1,106 @@
+"""Files of words: the one of the manual drives its invented controller, and mistakes are named with their line."""
+
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fingervision.cli import cli
+from fingervision.domain.errors import DataError, DeviceError
+from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.manual import manual_control
+from fingervision.testbed.text_protocol.words import known_words
+from tests.testbed.stages.emulators import Conex, Emulator, Invented
+from tests.testbed.stages.stage_cases import Case, text
+
+pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
+PAGE = (Path(__file__).parents[3] / "docs" / "how_to" / "stages.md").read_text(encoding="utf-8")
+EXAMPLE = re.search(r"```toml\n( *# my_stage\.toml\n.*?)```", PAGE, re.DOTALL)[1].replace("\n   ", "\n")  # type: ignore[index]
+# What a reader of the page wrote for a controller that no file of the package knows.
+CONEX = """
+schema = 1
+name = "Newport CONEX-CC"
+baud = 921600
+line_end = "\\r\\n"
+[settings]
+axis = 1
+[[open]]
+say = "{axis}ID?"
+reply = '^{axis}ID'
+[position]
+say = "{axis}TP"
+reply = '^{axis}TP([-+\\d.eE]+)$'
+[busy]
+say = "{axis}TS"
+reply = '^{axis}TS[0-9A-F]{4}([0-9A-F]{2})$'
+moving = '^(28|1E)$'
+[move]
+say = ["{axis}VA{speed:.4f}", "{axis}PA{to:.5f}"]
+[check]
+say = "{axis}TE"
+reply = '^{axis}TE(?:@|(.))$'
+[home]
+say = "{axis}OR"
+[stop]
+say = "{axis}ST"
+"""
+
+
+def bed_with(words: str, device: Emulator, folder: Path) -> Path:
+    (folder / "own.toml").write_text(words, encoding="utf-8")
+    return Case(Invented, text("./own.toml")).bed_at(folder, device)
+
+
+@pytest.mark.parametrize(("words", "make"), [(EXAMPLE, Invented), (CONEX, Conex)])
+def test_a_file_of_ones_own_drives_its_controller(words: str, make: type[Emulator], tmp_path: Path) -> None:
+    device = make()
+    bed = open_bed(str(bed_with(words, device, tmp_path)))
+    assert manual_control.home(bed) == 0.0
+    assert manual_control.move(bed, 0.2, 2.0) == pytest.approx(0.2, abs=1e-4)
+    assert device.plant.at() == pytest.approx(0.2, abs=1e-4)
+    bed.close()
+    device.close()
+
+
+def test_a_refusal_before_homing_is_a_sentence_and_an_alarm(tmp_path: Path) -> None:
+    device = Conex()
+    bed = open_bed(str(bed_with(CONEX, device, tmp_path)))
+    with pytest.raises(DeviceError, match="reported H: remove the cause, and home"):
+        bed.actuator.move(0.1, 1.0)
+    assert bed.actuator.alarm is not None
+    manual_control.home(bed)
+    assert bed.actuator.alarm is None
+    bed.close()
+    device.close()
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "says"),
+    [
+        ("[stop]", "[halt]", r"halt in .*is not known|no \[stop\]"),
+        ("{to:.5f}", "{too:.5f}", r"say in line 19 of .*own\.toml must have no placeholders but to, speed, axis"),
+        ("'^(28|1E)$'", "'^(28|1E$'", "moving in line 1. .*regular expression"),
+        ("{axis}TP([", "{axis}TP[[", "regular expression"),
+        ("schema = 1", "schema = 9", "newer fingervision"),
+    ],
+)
+def test_bed_check_names_a_mistake_without_the_controller(right: str, wrong: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text(CONEX.replace(right, wrong), encoding="utf-8")
+    (tmp_path / "recipe.toml").write_text('schema = 1\n[[step]]\nkind = "move"\nto_mm = 0.1\nspeed_mm_s = 1.0\n')
+    limits = 'lower_mm = 0\nupper_mm = 1\nspeed_mm_s = 1\n[camera]\nkind = "simulated"\n[gripper]\n'
+    bed = f"schema = 1\n[actuator]\n{text('./own.toml')}{limits}"
+    (tmp_path / "bed.toml").write_text(bed.replace("PORT", "/dev/nothing"), encoding="utf-8")
+    done = CliRunner().invoke(cli, ["bed", "check", str(tmp_path / "recipe.toml"), "--bed", str(tmp_path / "bed.toml")])
+    assert done.exit_code == 1
+    assert re.search(says, done.output + str(done.exception))
+
+
+def test_every_file_of_the_package_stands_in_the_manual() -> None:
+    assert {name for name in known_words() if f"`{name}`" not in PAGE} == set()
+
+
+def test_an_unknown_name_is_refused_with_the_known_ones(tmp_path: Path) -> None:
+    path = Case(Invented, text("grlb")).bed_at(tmp_path, Invented())
+    with pytest.raises(DataError, match="did you mean grbl"):
+        open_bed(str(path))
