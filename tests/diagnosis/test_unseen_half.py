@@ -12,6 +12,7 @@ from fingervision.diagnosis.inference.searched import problem_of
 from fingervision.diagnosis.inference.verdict import resembling
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
+from fingervision.diagnosis.report.sentences import tried
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Verdict
 from fingervision.models.corrected import CorrectedModel
@@ -72,3 +73,10 @@ def test_noise_seldom_resembles_itself_and_structure_does() -> None:
     assert resembling(np.sin(6.0 * u) + 0.3 * rng.standard_normal(40), u)
     shuffled = rng.permutation(40)
     assert resembling((np.sin(6.0 * u) + 0.3 * rng.standard_normal(40))[shuffled], u[shuffled])
+
+
+def test_the_sentence_on_what_was_tried_names_what_explains_a_part() -> None:
+    parts = ({"effects": ["backlash"], "explained_share": 0.68}, {"effects": ["drive_lag"], "explained_share": 0.01})
+    assert "backlash 68 %" in tried(parts)
+    assert "drive_lag" not in tried(parts)
+    assert "no single effect" in tried(parts[1:])

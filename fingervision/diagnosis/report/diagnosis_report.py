@@ -13,6 +13,7 @@ from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.answer import Answer
 from fingervision.diagnosis.inference.held_out_prediction import left_out_rms_mm, rms_mm
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
+from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.search_state import Findings
@@ -278,7 +279,7 @@ def diagnosis_report(
     proposal = next_run(data, found.problem, list(members[:MEMBERS_SEPARATED]), posterior, rng)
     mistaken = mistake is not None and mistake.blocks
     left = places(data, found.problem, answered.after_mm, np.random.default_rng(LOOKED_AT))
-    runners_up = _runners_up(found)
+    runners_up = _runners_up(data, found)
     return DiagnosisReport(
         verdict=decided,
         sentence=answer(decided, unknown, effects, alternatives, disagreement, mistaken=mistaken),
@@ -317,14 +318,19 @@ def diagnosis_report(
     )
 
 
-def _runners_up(found: Findings) -> tuple[dict[str, object], ...]:
-    """Single effects, best first, each with the share of the squared disagreement beyond noise that it explains."""
-    rows = float(found.problem.measured.size - found.problem.whitener.aside.sum())
-    stands = max(found.nothing.score - rows, 1e-300)
+def _runners_up(data: Observations, found: Findings) -> tuple[dict[str, object], ...]:
+    """Single effects, best first, each with the share of the gap's squared disagreement that it explains alone."""
+    n = data.chain.history.input_mm.size
+    kept = ~found.problem.whitener.aside[:n]
+
+    def squared(values: Settings) -> float:
+        return float(np.sum((data.stacked_mm - data.chain.stacked(values))[:n][kept] ** 2))
+
+    before = max(squared({}), 1e-300)
     return tuple(
         {
             "effects": list(e.names),
-            "explained_share": float(np.clip((found.nothing.score - e.score) / stands, 0.0, 1.0)),
+            "explained_share": float(np.clip(1.0 - squared(e.values) / before, 0.0, 1.0)),
             "chi_square_more_than_best": e.score - found.best.score,
             "distance": found.distances.get(e.names),
         }
