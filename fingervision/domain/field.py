@@ -31,6 +31,8 @@ class Field:
         Numbers that must be exceeded, and must not be reached.
     of : tuple of str
         Allowed words; empty for any text.
+    shape : tuple of int
+        Numbers along each dimension of an array; -1 for any.
     hint : str
         What to do if a number lies beyond the limits.
     since : int
@@ -45,6 +47,7 @@ class Field:
     above: float = -inf
     below: float = inf
     of: tuple[str, ...] = ()
+    shape: tuple[int, ...] = ()
     hint: str = ""
     since: int = 1
 

@@ -2,10 +2,10 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from math import isclose
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,10 @@ from calib.limits import Limits
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.plane import Plane
 from fingervision.domain.errors import DataError, InputFileError, OutputError
+from fingervision.domain.field import Field
 from fingervision.storage.durable import replaced
-from fingervision.storage.number_columns import is_number
 from fingervision.storage.plain_file import json_of
-
-# Values of a calibration file, checked one by one, and the calibration made from them.
+from fingervision.storage.toml_section import Section
 
 Floats = NDArray[np.float64]
 
@@ -29,236 +28,201 @@ Floats = NDArray[np.float64]
 SCHEMA = 1
 # A standard uncertainty that occurs twice in the file (alone and in the covariance) may have been rounded by hand.
 SAME_U = 0.01
+COVARIANCE = "covariance of (px_per_mm, edge_bias_px)"
 
 
-class CalibrationReader:
-    """Reader of the values of a calibration file, with error messages for invalid values.
+@dataclass(frozen=True, slots=True)
+class LensFile:
+    """The object `lens`."""
 
-    Parameters
-    ----------
-    path : Path
-        The file, for the messages.
-    content : object
-        What the file holds, parsed from JSON.
+    model: Annotated[str, Field("`brown`", of=("brown",))]
+    parameters: Annotated[
+        Floats,
+        Field("focal lengths, centre (px) and distortion: fx, fy, cx, cy, k1, k2, p1, p2, k3", shape=(9,)),
+    ]
+    covariance: Annotated[Floats, Field("covariance of the parameters", shape=(9, 9))]
 
-    Raises
-    ------
-    DataError
-        The content is not a JSON object with a schema.
-    """
 
-    def __init__(self, path: Path, content: object) -> None:
-        self._path = path
-        if not isinstance(content, dict) or "schema" not in content:
-            self._refuse("it has no schema; make a calibration with `fingervision calibrate`")
-        self._content: dict[str, Any] = content
+@dataclass(frozen=True, slots=True)
+class PlaneFile:
+    """The object `plane`."""
 
-    def _refuse(self, words: str) -> NoReturn:
-        raise DataError(f"{self._path} is not a usable calibration: {words}.")
+    homography: Annotated[Floats, Field("perspective of the plane, determined with a board", shape=(3, 3))]
 
-    def calibration(self) -> Calibration:
-        """Return the calibration.
 
-        Raises
-        ------
-        DataError
-            The schema is newer than this program, a value is missing or not allowed, or two values contradict each
-            other.
-        """
-        schema = self._content["schema"]
-        if isinstance(schema, bool) or not isinstance(schema, int) or schema < 1:
-            self._refuse(f"schema must be a whole number from 1, but is {schema!r}")
-        if schema > SCHEMA:
-            self._refuse(
-                f"it has schema {schema}, but this program reads only schemas up to {SCHEMA}; use a newer fingervision"
-            )
-        budget = self._object("budget")
-        limits, stated = self._limits(budget.get("limits"))
-        try:
-            return Calibration(
-                px_per_mm=self._number(self._content, "px_per_mm", positive=True),
-                edge_bias_px=self._number(self._content, "edge_bias_px"),
-                parts=self._parts(budget),
-                frame_size_px=(self._count("frame_width"), self._count("frame_height")),
-                limits=limits,
-                stated=stated,
-                response=self._response(budget.get("response")),
-                lens=self._lens(),
-                plane=self._plane(),
-                references=self._references(),
-                camera={str(name): str(value) for name, value in self._object("camera").items()},
-                made_at=self._text(self._content, "made_at"),
-                software=self._text(self._content, "software"),
-                camera_response=self._camera_response(),
-                response_known=self._camera_response_content().get("known") is True,
-                response_shift_px=self._response_shift_px(),
-            )
-        except CalibrationError as error:
-            self._refuse(str(error).rstrip("."))
+@dataclass(frozen=True, slots=True)
+class ReferenceFile:
+    """An object of the list `reference`."""
 
-    def _camera_response_content(self) -> dict[str, Any]:
-        content = self._object("budget").get("camera_response")
-        if content is not None and not isinstance(content, dict):
-            self._refuse(f"camera_response must be an object, but is {content!r}")
-        return content or {}
+    size_mm: Annotated[float, Field("certified size", "mm", above=0.0)]
+    u_size_mm: Annotated[float, Field("its standard uncertainty", "mm")]
+    what: Annotated[str, Field("kind of object, and the name of its picture")] = ""
+    certificate: Annotated[str, Field("name of the certificate")] = ""
+    date: Annotated[str, Field("date of the certificate")] = ""
 
-    def _camera_response(self) -> CameraResponse | None:
-        content = self._camera_response_content()
-        name = self._text(content, "name")
-        if not name:
-            return None
-        if content.get("level") is None:
-            return standard_response(name)
-        level, light = content["level"], content.get("light")
-        size = len(level) if isinstance(level, list) else 0
-        top = content.get("top_level")
-        if top is not None and (isinstance(top, bool) or not isinstance(top, int) or top < 1):
-            self._refuse(f"top_level of the response must be a whole number, but is {top!r}")
-        return CameraResponse(
-            name,
-            self._array(level, "level of the response", (size,)),
-            self._array(light, "light of the response", (size,)),
-            top,
+
+@dataclass(frozen=True, slots=True)
+class ResponseFile:
+    """The object `budget.response`."""
+
+    lens: Annotated[Floats, Field("change of the references by the lens", shape=(2,))]
+    tilt: Annotated[Floats, Field("change of the references by tilt, per radian about each axis", shape=(2, 2))]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraResponseFile:
+    """The object `budget.camera_response`."""
+
+    name: Annotated[str, Field("standard response, or name of its file")] = ""
+    known: Annotated[bool, Field("whether it was stated, not assumed")] = False
+    shift_px: Annotated[float | None, Field("shift of an edge if another usual response holds", "px")] = None
+    top_level: Annotated[int | None, Field("full scale of a picture; null for any", low=1)] = None
+    level: Annotated[Floats | None, Field("curve of the response, where it is no standard one", shape=(-1,))] = None
+    light: Annotated[Floats | None, Field("curve of the response, where it is no standard one", shape=(-1,))] = None
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationFile:
+    """The file calibration.json."""
+
+    schema: Annotated[int, Field("1", low=1)]
+    px_per_mm: Annotated[float, Field("scale s", "px/mm", above=0.0)]
+    u_px_per_mm: Annotated[float, Field("standard uncertainty of the scale", "px/mm", low=0.0)]
+    edge_bias_px: Annotated[
+        float,
+        Field(
+            "edge bias b in `gap_mm = (gap_px + b) / px_per_mm` for a light gap (for a dark gap, b has the opposite "
+            "sign)",
+            "px",
+        ),
+    ]
+    u_edge_bias_px: Annotated[float, Field("standard uncertainty of the edge bias", "px", low=0.0)]
+    covariance: Annotated[Floats, Field(COVARIANCE, shape=(2, 2))]
+    frame_width: Annotated[
+        int, Field("size of the calibration pictures; frames of another size are refused", "px", low=1)
+    ]
+    frame_height: Annotated[
+        int, Field("size of the calibration pictures; frames of another size are refused", "px", low=1)
+    ]
+    lens: Annotated[LensFile | None, Field("null, or `model`, `parameters`, `covariance` (below)")] = None
+    plane: Annotated[PlaneFile | None, Field("null, or the `homography` that was determined with a board")] = None
+    reference: Annotated[tuple[ReferenceFile, ...], Field("list of reference objects (below)")] = ()
+    made_at: Annotated[str, Field("time of the calibration")] = ""
+    software: Annotated[str, Field("program and its version")] = ""
+
+
+class _Reader:
+    """Checks the parts of a calibration file against each other."""
+
+    def __init__(self, path: Path, content: Mapping[str, Any]) -> None:
+        stated = content.get("reference")
+        values = {**content, "reference": [stated] if isinstance(stated, dict) else stated or []}
+        self._top = Section(path, "", "", values, is_open=True)
+        self._budget = self._table(self._top, "budget")
+
+    def _table(self, section: Section, key: str) -> Section:
+        return (
+            section.table(key)
+            if section.values.get(key) is not None
+            else Section(section.path, "", section.dotted(key), {}, is_open=True)
         )
 
-    def _response_shift_px(self) -> float | None:
-        content = self._camera_response_content()
-        return None if content.get("shift_px") is None else self._number(content, "shift_px")
+    def calibration(self) -> Calibration:
+        """Return the calibration."""
+        self._top.schema(SCHEMA)
+        file = self._top.record(CalibrationFile)
+        limits, stated = self._limits()
+        response = self._table(self._budget, "response")
+        camera = self._table(self._budget, "camera_response").record(CameraResponseFile)
+        turned = response.record(ResponseFile) if response.values else None
+        return Calibration(
+            px_per_mm=file.px_per_mm,
+            edge_bias_px=file.edge_bias_px,
+            parts=self._parts(file),
+            frame_size_px=(file.frame_width, file.frame_height),
+            limits=limits,
+            stated=stated,
+            response=Response() if turned is None else Response(turned.lens, turned.tilt),
+            lens=self._lens(file.lens),
+            plane=self._plane(file.plane),
+            references=tuple(Reference(**asdict(each)) for each in file.reference),
+            camera={str(name): str(value) for name, value in self._table(self._top, "camera").values.items()},
+            made_at=file.made_at,
+            software=file.software,
+            camera_response=self._camera_response(camera),
+            response_known=camera.known,
+            response_shift_px=camera.shift_px,
+        )
 
-    def _object(self, name: str) -> dict[str, Any]:
-        value = self._content.get(name)
-        if value is None:
-            return {}
-        if not isinstance(value, dict):
-            self._refuse(f"{name} must be an object, but is {value!r}")
-        return value
+    def _camera_response(self, stated: CameraResponseFile) -> CameraResponse | None:
+        if not stated.name:
+            return None
+        if stated.level is None:
+            return standard_response(stated.name)
+        light = self._budget.table("camera_response").array("light", (stated.level.size,))
+        return CameraResponse(stated.name, stated.level, light, stated.top_level)
 
-    def _number(self, where: Mapping[str, Any], name: str, positive: bool = False) -> float:
-        value = where.get(name)
-        if not is_number(value) or (positive and not value > 0):  # type: ignore[operator] # a number, as just seen
-            self._refuse(f"{name} must be a {'positive ' if positive else ''}number, but is {value!r}")
-        return float(value)  # type: ignore[arg-type] # a number, as just seen
-
-    def _count(self, name: str) -> int:
-        value = self._content.get(name)
-        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-            self._refuse(f"{name} must be a whole number of pixels, but is {value!r}")
-        return value
-
-    def _text(self, where: Mapping[str, Any], name: str) -> str:
-        value = where.get(name, "")
-        if value is not None and not isinstance(value, str):
-            self._refuse(f"{name} must be a text, but is {value!r}")
-        return value or ""
-
-    def _array(self, value: object, name: str, shape: tuple[int, ...]) -> Floats:
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            array = np.empty(0)
-        if array.shape != shape or not np.all(np.isfinite(array)):
-            self._refuse(f"{name} must be {' by '.join(map(str, shape))} numbers, but is {value!r}")
-        return array
-
-    def _covariance(self, value: object, name: str, size: int) -> Floats:
-        covariance = self._array(value, name, (size, size))
+    def _covariance(self, section: Section, key: str, covariance: Floats) -> Floats:
         u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         with np.errstate(over="ignore"):  # refused below
             correlation = covariance / np.maximum(np.outer(u, u), np.finfo(float).tiny)
-        if not np.all(np.isfinite(correlation)):
-            self._refuse(f"{name} must be symmetric and not negative, but is {value!r}")
-        smallest = float(np.linalg.eigvalsh((correlation + correlation.T) / 2.0).min()) if covariance.any() else 0.0
-        if np.any(np.diag(covariance) < 0.0) or not np.allclose(correlation, correlation.T) or smallest < -1e-6:
-            self._refuse(f"{name} must be symmetric and not negative, but is {value!r}")
+        is_finite = bool(np.all(np.isfinite(correlation)))
+        smallest = (
+            float(np.linalg.eigvalsh((correlation + correlation.T) / 2.0).min())
+            if is_finite and covariance.any()
+            else 0.0
+        )
+        is_symmetric = is_finite and np.allclose(correlation, correlation.T)
+        if not is_symmetric or np.any(np.diag(covariance) < 0.0) or smallest < -1e-6:
+            section.refuse(key, f"must be symmetric and not negative, but is {covariance.tolist()}.")
         return covariance
 
-    def _parts(self, budget: Mapping[str, Any]) -> tuple[ScalePart, ...]:
-        total = self._covariance(self._content.get("covariance"), "covariance", 2)
-        for name, variance in (("u_px_per_mm", total[0, 0]), ("u_edge_bias_px", total[1, 1])):
-            u = self._number(self._content, name)
-            if u < 0.0 or not isclose(u, variance**0.5, rel_tol=0.5 * SAME_U, abs_tol=1e-9):
-                self._refuse(f"{name} must be the root of its variance in covariance, {variance**0.5:g}, but is {u:g}")
-        stated = budget.get("parts")
-        if stated is None:
+    def _parts(self, file: CalibrationFile) -> tuple[ScalePart, ...]:
+        total = self._covariance(self._top, "covariance", file.covariance)
+        pairs = (("u_px_per_mm", file.u_px_per_mm), ("u_edge_bias_px", file.u_edge_bias_px))
+        for (name, u), variance in zip(pairs, np.diag(total).tolist(), strict=True):
+            if not isclose(u, variance**0.5, rel_tol=0.5 * SAME_U, abs_tol=1e-9):
+                self._top.refuse(
+                    name, f"must be the root of its variance in covariance, {variance**0.5:g}, but is {u:g}."
+                )
+        if self._budget.values.get("parts") is None:
             return (ScalePart("scale and edge bias", total, "the calibration file"),)
-        if not isinstance(stated, list) or not all(isinstance(part, dict) for part in stated):
-            self._refuse(f"budget.parts must be a list of objects, but is {stated!r}")
         parts = tuple(
             ScalePart(
-                self._text(part, "source"),
-                self._covariance(part.get("covariance"), "budget.parts.covariance", 2),
-                self._text(part, "from"),
+                part.word("source", ""),
+                self._covariance(part, "covariance", part.array("covariance", (2, 2))),
+                part.word("from", ""),
             )
-            for part in stated
+            for part in self._budget.tables("parts")
         )
         added = np.sum([part.covariance for part in parts] or [np.zeros((2, 2))], axis=0)
         if not np.allclose(added, total, rtol=1e-6, atol=1e-18):
-            self._refuse("the covariances of budget.parts must add up to covariance, but do not")
+            self._budget.refuse("parts", "must have covariances that add up to covariance, but has not.")
         return parts
 
-    def _limits(self, stated: object) -> tuple[Limits, frozenset[str]]:
+    def _limits(self) -> tuple[Limits, frozenset[str]]:
         # A file of another program may state no limits: the budget then consists of the covariance alone.
-        nothing = {item.name: 0.0 for item in fields(Limits)} | {"camera_distance_mm": Limits().camera_distance_mm}
-        if stated is None:
-            return Limits(**nothing), frozenset()
-        if not isinstance(stated, dict) or not all(isinstance(limit, dict) for limit in stated.values()):
-            self._refuse(f"budget.limits must be an object of objects, but is {stated!r}")
-        unknown = set(stated) - set(nothing)
-        if unknown:
-            self._refuse(f"budget.limits has an unknown limit, {sorted(unknown)[0]}")
-        values = {name: self._number(limit, "value") for name, limit in stated.items()}
-        try:
-            limits = Limits(**(nothing | values))
-        except CalibrationError as error:
-            self._refuse(str(error).rstrip("."))
-        return limits, frozenset(name for name, limit in stated.items() if limit.get("stated") is True)
+        values = {item.name: 0.0 for item in fields(Limits)} | {"camera_distance_mm": Limits().camera_distance_mm}
+        limits = self._table(self._budget, "limits")
+        limits.only(values)
+        tables = {name: limits.table(name) for name in limits.values}
+        values |= {name: table.number("value") for name, table in tables.items()}
+        return Limits(**values), frozenset(name for name, table in tables.items() if table.flag("stated"))
 
-    def _response(self, stated: object) -> Response:
-        if stated is None:
-            return Response()
-        if not isinstance(stated, dict):
-            self._refuse(f"budget.response must be an object, but is {stated!r}")
-        return Response(
-            lens=self._array(stated.get("lens"), "budget.response.lens", (2,)),
-            tilt=self._array(stated.get("tilt"), "budget.response.tilt", (2, 2)),
-        )
-
-    def _lens(self) -> Lens | None:
-        lens = self._object("lens")
-        if not lens:
+    def _lens(self, lens: LensFile | None) -> Lens | None:
+        if lens is None:
             return None
-        if lens.get("model") != "brown":
-            self._refuse(f"lens.model must be 'brown', but is {lens.get('model')!r}")
-        parameters = self._array(lens.get("parameters"), "lens.parameters", (9,))
-        if min(parameters[:2]) <= 0.0:
-            self._refuse(f"the focal lengths in lens.parameters must be positive, but are {parameters[:2].tolist()}")
-        return Lens(parameters, self._covariance(lens.get("covariance"), "lens.covariance", 9))
+        if min(lens.parameters[:2]) <= 0.0:
+            self._top.refuse("lens", f"must have positive focal lengths, but has {lens.parameters[:2].tolist()}.")
+        return Lens(lens.parameters, self._covariance(self._top.table("lens"), "covariance", lens.covariance))
 
-    def _plane(self) -> Plane | None:
-        plane = self._object("plane")
-        if not plane:
+    def _plane(self, plane: PlaneFile | None) -> Plane | None:
+        if plane is None:
             return None
-        homography = self._array(plane.get("homography"), "plane.homography", (3, 3))
-        if abs(np.linalg.det(homography)) <= np.finfo(float).eps * np.abs(homography).max() ** 3:
-            self._refuse(f"plane.homography must be invertible, but is {homography.tolist()}")
-        return Plane(homography)
-
-    def _references(self) -> tuple[Reference, ...]:
-        stated = self._content.get("reference") or []
-        if isinstance(stated, dict):
-            stated = [stated]
-        if not isinstance(stated, list) or not all(isinstance(reference, dict) for reference in stated):
-            self._refuse(f"reference must be a list of objects, but is {stated!r}")
-        return tuple(
-            Reference(
-                what=self._text(reference, "what"),
-                size_mm=self._number(reference, "size_mm", positive=True),
-                u_size_mm=self._number(reference, "u_size_mm"),
-                certificate=self._text(reference, "certificate"),
-                date=self._text(reference, "date"),
-            )
-            for reference in stated
-        )
+        h = plane.homography
+        if abs(np.linalg.det(h)) <= np.finfo(float).eps * np.abs(h).max() ** 3:
+            self._top.table("plane").refuse("homography", f"must be invertible, but is {h.tolist()}.")
+        return Plane(h)
 
 
 def write_calibration(calibration: Calibration, path: Path) -> None:
@@ -348,4 +312,11 @@ def read_calibration(path: Path) -> Calibration:
         raise InputFileError(f"The calibration file {path} could not be read: {error.strerror}.") from error
     except ValueError as error:
         raise DataError(f"{path} is not a calibration file: it is not JSON ({error}).") from error
-    return CalibrationReader(path, content).calibration()
+    if not isinstance(content, dict) or "schema" not in content:
+        raise DataError(
+            f"{path} is not a usable calibration: it has no schema; make a calibration with `fingervision calibrate`."
+        )
+    try:
+        return _Reader(path, content).calibration()
+    except CalibrationError as error:
+        raise DataError(f"{path} is not a usable calibration: {str(error).rstrip('.')}.") from error

@@ -7,12 +7,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, get_args, get_origin
 
 from fingervision.domain.errors import DataError, InputFileError
 from fingervision.domain.field import Declared, Field, declared
 from fingervision.storage.number_columns import is_number
 from fingervision.storage.plain_file import NotUtf8Error, parsed, text_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 Record = TypeVar("Record")
 
@@ -91,6 +95,8 @@ class Section:
     uncertainties : dict of str to float, or None
         Where not None, a number may be written `{ value = 1.0, u = 0.1 }`; its standard uncertainty is put here, by
         its dotted name.
+    is_open : bool
+        Whether other programs may add keys, which are then ignored.
     """
 
     path: Path
@@ -99,6 +105,7 @@ class Section:
     values: Mapping[str, Any]
     place: int = 0
     uncertainties: dict[str, float] | None = None
+    is_open: bool = False
 
     def at(self, key: str | None = None) -> str:
         """Location of a key: `line 12 of recipe.toml`; the file alone if its text is not known."""
@@ -182,17 +189,17 @@ class Section:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             self.refuse(key, f"must be a table [{key}], but is {value!r}.")
-        return Section(self.path, self.text, self.dotted(key), value, 0, self.uncertainties)
+        return self._inner(key, value, 0)
+
+    def _inner(self, key: str, values: Mapping[str, Any], place: int) -> "Section":
+        return Section(self.path, self.text, self.dotted(key), values, place, self.uncertainties, self.is_open)
 
     def tables(self, key: str) -> tuple["Section", ...]:
         """Read the sub-tables `[[key]]`, in order."""
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
             self.refuse(key, f"must be tables [[{key}]], but is {value!r}.")
-        return tuple(
-            Section(self.path, self.text, self.dotted(key), each, place, self.uncertainties)
-            for place, each in enumerate(value)
-        )
+        return tuple(self._inner(key, each, place) for place, each in enumerate(value))
 
     def record(self, kind: type[Record]) -> Record:
         """Read the table as a record (a dataclass) whose declared fields are its keys; nested records are sub-tables.
@@ -203,7 +210,8 @@ class Section:
             A key is unknown or missing, or its value is not one of the declared kind and limits.
         """
         fields = declared(kind)
-        self.only([each.name for each in fields])
+        if not self.is_open:
+            self.only([each.name for each in fields])
         given = [each for each in fields if self.values.get(each.name) is not None or each.is_required]
         return kind(**{each.name: self._value(each) for each in given})
 
@@ -218,6 +226,8 @@ class Section:
             return self.table(key).record(nested)
         if get_origin(kind) is tuple and is_dataclass(inner):
             return tuple(section.record(nested) for section in self.tables(key))
+        if field.shape:
+            return self.array(key, field.shape)
         if get_origin(kind) is tuple:
             return self._tuple(key, self._stated(key), kind, field)
         if kind is bool:
@@ -230,6 +240,22 @@ class Section:
         if isinstance(value, dict) and self.uncertainties is not None:
             value = self._uncertain(key, value)
         return self._one(key, value, kind, field)
+
+    def array(self, key: str, shape: tuple[int, ...]) -> "NDArray[np.float64]":
+        """Read finite numbers in nested lists; -1 stands for any number of them along a dimension."""
+        import numpy as np
+
+        value = self._stated(key)
+        try:
+            array = np.array(value, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            array = np.full((), np.nan)
+        sizes = zip(shape, array.shape, strict=False)
+        is_shaped = array.ndim == len(shape) and all(size in (-1, found) for size, found in sizes)
+        if not is_shaped or not np.all(np.isfinite(array)):
+            words = " by ".join("any number of" if size < 0 else str(size) for size in shape)
+            self.refuse(key, f"must be {words} numbers, but is {value!r}.")
+        return array
 
     def _uncertain(self, key: str, value: dict[str, Any]) -> Any:
         """Note the uncertainty of a number `{ value, u }`, and return the number."""
