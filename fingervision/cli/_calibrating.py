@@ -44,7 +44,7 @@ def _calibrate(
 ) -> None:
     from fingervision.interface.calibrate import calibrate
     from fingervision.interface.calibration_report import as_json as for_programs
-    from fingervision.storage.calibration_owner import refuse_foreign
+    from fingervision.storage.calibration_json import refuse_foreign
 
     refuse_foreign(out)
     made = calibrate(kind, pictures, camera=_settings(camera), **options)

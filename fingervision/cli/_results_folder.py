@@ -20,7 +20,7 @@ def results_folder(out: Path, source: Path) -> Path:
     UsageError
         The folder that the user names holds the results of another input.
     """
-    from fingervision.storage.result_owner import own_folder
+    from fingervision.storage.out_folder import own_folder
 
     context = click.get_current_context()
     named = context.get_parameter_source("out") is not click.core.ParameterSource.DEFAULT

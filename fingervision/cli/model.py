@@ -133,7 +133,7 @@ def command(
     from fingervision.models.physics import LINEAR, Physics
     from fingervision.storage.gripper_toml import read_gripper
     from fingervision.storage.mechanism_toml import is_mechanism
-    from fingervision.storage.result_owner import began_in, finish_in
+    from fingervision.storage.out_folder import began_in, finish_in
     from fingervision.storage.simulation_table import write_simulation
 
     asked = motion_asked(drive, columns, modes, frequency, damping, rate_hz, film=film)

@@ -18,8 +18,7 @@ from typing import Any
 
 from fingervision.domain.errors import DataError
 from fingervision.gauges.kinds import Kind, Spec, kind_named, kinds
-from fingervision.storage.toml_purpose import refuse_other_file
-from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_section import Section, read_document, refuse_other_file
 
 SCHEMA = 1
 # Largest number of gauges, and largest length of a name; more would be a mistake in the file.

@@ -15,8 +15,7 @@ from fingervision.interface.argument_checks import path_of, region_of
 from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.calibration_report import budget_lines, scale_lines
 from fingervision.interface.picture_response import PictureResponse
-from fingervision.storage.calibration_json import read_calibration, write_calibration
-from fingervision.storage.calibration_owner import refuse_foreign, write_picture
+from fingervision.storage.calibration_json import read_calibration, refuse_foreign, write_calibration, write_picture
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -16,9 +16,8 @@ from fingervision.interface.argument_checks import whole_number
 from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.saved_results import cell_html, save_results
 from fingervision.interface.tables import measured_given, models_given
-from fingervision.storage.out_folder import out_folder
+from fingervision.storage.out_folder import mark_owner, out_folder
 from fingervision.storage.provenance import Provenance, provenance
-from fingervision.storage.result_owner import mark_owner
 
 if TYPE_CHECKING:
     import os

@@ -23,9 +23,8 @@ from fingervision.interface.own_effect import added
 from fingervision.interface.saved_results import cell_html, save_results
 from fingervision.interface.tables import effect_names, measured_given, model_given, own_base
 from fingervision.models.corrected import CorrectedModel
-from fingervision.storage.out_folder import out_folder
+from fingervision.storage.out_folder import mark_owner, out_folder
 from fingervision.storage.provenance import Provenance, provenance
-from fingervision.storage.result_owner import mark_owner
 
 if TYPE_CHECKING:
     import os

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 from fingervision.interface.argument_checks import path_of
 from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.notebook import image_html, png_of_figure
-from fingervision.storage.result_owner import own_folder
+from fingervision.storage.out_folder import own_folder
 
 if TYPE_CHECKING:
     import os

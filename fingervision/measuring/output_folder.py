@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.domain.errors import OutputError, UsageError
-from fingervision.storage.folder_lock import FolderLock
 from fingervision.storage.gaps_csv import COLUMNS
-from fingervision.storage.out_folder import make_out_folder, out_folder
+from fingervision.storage.out_folder import FolderLock, make_out_folder, out_folder
 from fingervision.storage.summary_json import recording_of
 
 GAPS, SUMMARY, FIGURE, OVERLAY, STEPS = "gaps.csv", "summary.json", "gap.png", "overlay.mp4", "steps"

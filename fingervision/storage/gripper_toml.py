@@ -11,8 +11,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material, SNLine
 from fingervision.models.gripper_outline import check_outline, check_stated_size
 from fingervision.models.plane_shapes import crosses_itself
-from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
-from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_section import DRAWINGS, Section, read_document, refuse_other_file
 
 _STATED = 1.05
 """Largest ratio of a stated width to the width that follows from the drawing."""

@@ -13,14 +13,12 @@ from fingervision.domain.parameter import Estimate
 from fingervision.models.flexure import Flexure
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box, crosses_itself
-from fingervision.storage.arithmetic import number
 from fingervision.storage.drawing_numbers import bare_tables, changed_tables, numbers_of
-from fingervision.storage.drawing_reader import DrawingReader, as_table
+from fingervision.storage.drawing_reader import DrawingReader, as_table, number
 from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
 from fingervision.storage.plain_file import toml_of
-from fingervision.storage.toml_purpose import DRAWINGS, refuse_other_file
-from fingervision.storage.toml_section import read_document
+from fingervision.storage.toml_section import DRAWINGS, read_document, refuse_other_file
 
 _TOP = (
     "schema",

@@ -1,9 +1,9 @@
-"""Reader of a table of a TOML file key by key; error messages state file, line and key."""
+"""Reader of the tables of TOML and JSON documents, by key or by declared record; errors state file, line and key."""
 
 import difflib
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -13,6 +13,45 @@ from fingervision.domain.errors import DataError, InputFileError
 from fingervision.domain.field import Declared, Field, declared
 from fingervision.storage.number_columns import is_number
 from fingervision.storage.plain_file import NotUtf8Error, parsed, text_of
+
+# Table or key that only this kind of file has, whether it is a list of tables, and the option that takes the file.
+_PURPOSES = {
+    "the description of a bed": (("actuator", dict), "the option --bed takes it"),
+    "a gauge file": (("gauge", list), "the option --gauges of measure and live takes it"),
+    "the drawing of a mechanism": (("body", list), "the options --mechanism of measure and --model take it"),
+    "the drawing of a gripper": (("lever", dict), "the options --mechanism of measure and --model take it"),
+    "a mechanism after a gripper": (("gripper", dict), "the options --mechanism of measure and --model take it"),
+    "a recipe": (("step", list), "the command bed run takes it"),
+    "a corrected model": (("base", str), "the option --model of compare and diagnose takes it"),
+}
+DRAWINGS = ("the drawing of a mechanism", "the drawing of a gripper", "a mechanism after a gripper")
+
+
+def refuse_other_file(path: Path | str, tables: Mapping[str, Any], need: str, wanted: Collection[str]) -> None:
+    """Refuse a TOML file of another purpose; the message names the option or command that takes the file.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file, for the message.
+    tables : mapping
+        Its tables.
+    need : str
+        What the file must be, for the message.
+    wanted : collection of str
+        Accepted kinds of file, in the words of this module.
+
+    Raises
+    ------
+    DataError
+        The tables belong to another kind of file.
+    """
+    for what, ((key, kind), takes) in _PURPOSES.items():
+        if isinstance(tables.get(key), kind):
+            if what not in wanted:
+                raise DataError(f"{path} must be {need}, but is {what}: {takes}.")
+            return
+
 
 if TYPE_CHECKING:
     import numpy as np

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fingervision.storage.channel_columns import NO_CHANNELS
+from fingervision.storage.measured_table import NO_CHANNELS
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.cells import to_numbers
 from fingervision.tables.column_names import BESIDE, BRACKETS, column_name

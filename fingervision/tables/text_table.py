@@ -22,12 +22,11 @@ from fingervision.tables.dialect import (
     is_value,
     split,
 )
-from fingervision.tables.header_pairs import Header
 from fingervision.tables.mapping import Entry
 from fingervision.tables.other_rows import is_other_header, other_header, statistics_below
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
-from fingervision.tables.text_header import HEADER_LINES, find_header, first_row, header_below_values, names_in
+from fingervision.tables.text_header import HEADER_LINES, Header, find_header, first_row, header_below_values, names_in
 from fingervision.tables.times import looks_like_time
 from fingervision.tables.units import known_unit
 from fingervision.tables.words import role_of

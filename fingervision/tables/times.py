@@ -1,4 +1,4 @@
-"""Convert dates and times of day, in the notations of common programs, to seconds since the first value."""
+"""Convert dates and times of day, in the notations of common programs, to seconds; leaps of clocks."""
 
 import re
 from collections.abc import Sequence
@@ -10,7 +10,121 @@ from numpy.typing import NDArray
 
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.dialect import MISSING
-from fingervision.tables.written_dates import days_and_clock, rewritten
+
+MONTH_WORDS = (
+    "jan january januar janv", "feb february februar fev", "mar march mrz marz", "apr april avr", "may mai",
+    "jun june juni juin", "jul july juli juil", "aug august aout", "sep sept september", "oct october okt oktober",
+    "nov november", "dec december dez dezember",
+)  # fmt: skip
+MONTHS = {word: number for number, words in enumerate(MONTH_WORDS, start=1) for word in words.split()}
+"""Months in English, German and French, in lower case and without accents."""
+WORD = r"(?P<month>[A-Za-zäéû]{3,9})\.?"
+CLOCK_PART = r"(?P<clock>\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:\s*[AaPp]\.?[Mm]\.?)?)?"
+WITH_WORD = (
+    re.compile(
+        rf"(?:[A-Za-z]{{2,9}},?\s+)?(?P<day>\d{{1,2}})\.?[-\s/]{WORD}[-\s/,]\s*(?P<year>\d{{4}}|\d\d)[T,:\s]*{CLOCK_PART}"
+    ),
+    re.compile(rf"(?:[A-Za-z]{{2,9}},?\s+)?{WORD}\s+(?P<day>\d{{1,2}}),?\s+(?P<year>\d{{4}}),?\s*{CLOCK_PART}"),
+    re.compile(rf"[A-Za-z]{{3}}\s+{WORD}\s+(?P<day>\d{{1,2}})\s+{CLOCK_PART}\s+(?P<year>\d{{4}})"),
+)
+"""`23-Nov-2026 13:24:07`, `Nov 23, 2026 13:24`, and the order of C's `ctime`: `Mon Nov 23 13:24:07 2026`."""
+COMPACT = re.compile(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)([.,]\d+)?(Z|[+-]\d{2}:?\d{2})?")
+WITH_DAYS = re.compile(r"(?P<days>\d+) days?,? (?P<clock>\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?)")
+PLAIN = str.maketrans("äéû", "aeu")
+
+
+def rewritten(text: str) -> str:
+    """Rewrite a date as `2026-11-23 13:24:07`; any other text is returned unchanged.
+
+    Examples
+    --------
+    >>> rewritten("23-Nov-2026 13:24:07.5"), rewritten("Mon Nov 23 13:24:07 2026"), rewritten("20261123T132407Z")
+    ('2026-11-23 13:24:07.5', '2026-11-23 13:24:07', '2026-11-23 13:24:07Z')
+    >>> rewritten("Nov 3, 2026 1:24 PM"), rewritten("13:24:07")
+    ('2026-11-03 1:24 PM', '13:24:07')
+    """
+    if (compact := COMPACT.fullmatch(text)) is not None:
+        year, month, day, hours, minutes, seconds, fraction, zone = compact.groups()
+        return f"{year}-{month}-{day} {hours}:{minutes}:{seconds}{fraction or ''}{zone or ''}"
+    if not any(map(str.isalpha, text)):
+        return text
+    for pattern in WITH_WORD:
+        match = pattern.fullmatch(text)
+        month = MONTHS.get(match["month"].lower().translate(PLAIN)) if match is not None else None
+        if match is not None and month is not None:
+            year = match["year"] if len(match["year"]) == 4 else f"20{match['year']}"
+            return f"{year}-{month:02}-{int(match['day']):02} {match['clock'] or ''}".rstrip()
+    return text
+
+
+def days_and_clock(text: str) -> tuple[int, str] | None:
+    """Split a duration with days.
+
+    Examples
+    --------
+    >>> days_and_clock("1 days 00:00:00.5")
+    (1, '00:00:00.5')
+    """
+    match = WITH_DAYS.fullmatch(text)
+    return None if match is None else (int(match["days"]), match["clock"])
+
+
+HOUR_S = 3600.0
+COUNTER_BITS = (16, 24, 31, 32)
+COUNTS_S = (1.0, 1e-3, 1e-6)
+"""What one count of a clock may be worth (s)."""
+OVERFLOWS_S = np.array([2.0**bits * count for bits in COUNTER_BITS for count in COUNTS_S])
+PERIODS_S = np.concatenate([[HOUR_S], OVERFLOWS_S])
+MOST_STEPS = 3.0
+"""Largest difference between a leap and its cause, in usual steps: a step may be lost or late beside it."""
+
+
+def usual_step(time: NDArray[np.float64]) -> float:
+    """Median time between two rows."""
+    return float(np.median(np.abs(np.diff(time))))
+
+
+def _period(step: NDArray[np.float64], usual: float) -> NDArray[np.float64]:
+    """For each step, what summer time or an overflow added to it, with its sign; 0 if neither explains it."""
+    if not 0.0 < usual < HOUR_S / (2.0 * MOST_STEPS):
+        return np.zeros(step.size)
+    signed = np.concatenate([PERIODS_S[:1], -PERIODS_S])
+    apart = np.abs(step[:, None] - signed - usual)
+    best = np.argmin(apart, axis=1)
+    return np.where(apart[np.arange(step.size), best] <= MOST_STEPS * usual, signed[best], 0.0)
+
+
+def is_known_leap(step: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether summer time or the overflow of a counter explains each of some steps of a time."""
+    return np.asarray(_period(step, usual_step(time)) != 0.0)
+
+
+def clock_leaps(time: NDArray[np.float64], *, dated: bool) -> NDArray[np.intp]:
+    """Steps of a clock that go back, and those by an hour more than usual, if times are dates.
+
+    Parameters
+    ----------
+    time : ndarray of float, shape (n,)
+        Times (s).
+    dated : bool
+        Whether the times were written as dates: only such clocks are put forward.
+    """
+    steps = np.diff(time)
+    far = np.flatnonzero((steps < 0.0) | ((steps > 0.5 * HOUR_S) & dated))
+    return far[(steps[far] < 0.0) | is_known_leap(steps[far], time)]
+
+
+def without_leaps(time: NDArray[np.float64], leaps: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Elapsed time of a clock whose steps at some places are leaps.
+
+    What is known to cause a leap is taken away; any other leap is replaced by the usual step.
+    """
+    usual = usual_step(time)
+    steps = np.diff(time)
+    cause = _period(steps[leaps], usual)
+    steps[leaps] = np.where(cause != 0.0, steps[leaps] - cause, usual)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
 
 CLOCK = re.compile(r"(?P<h>\d{1,2}):(?P<m>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d+))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?")
 DAY = re.compile(r"(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})(?P=mark)(?P<c>\d{1,4})")

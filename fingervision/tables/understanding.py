@@ -11,17 +11,15 @@ from numpy.typing import NDArray
 from fingervision.storage.number_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels, channels_in
 from fingervision.tables.cells import to_numbers
-from fingervision.tables.clock_leaps import clock_leaps, without_leaps
 from fingervision.tables.column_choice import NEEDED, Findings, choose
 from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
 from fingervision.tables.dialect import MISSING, NO_NUMBER
-from fingervision.tables.doubts import doubts
-from fingervision.tables.filler_values import dropped_out, filler_value, without_filler
-from fingervision.tables.long_table import refuse_long_table
+from fingervision.tables.doubts import doubts, dropped_out, filler_value, without_filler
 from fingervision.tables.mapping import Entry
+from fingervision.tables.own_format import refuse_long_table
 from fingervision.tables.questions import OpenQuestionError, Question, Reading, asked, span
 from fingervision.tables.raw_table import RawColumn, RawTable
-from fingervision.tables.times import is_day_number, is_epoch, looks_like_time, seconds_of
+from fingervision.tables.times import clock_leaps, is_day_number, is_epoch, looks_like_time, seconds_of, without_leaps
 from fingervision.tables.unit_readings import unit_question, unit_readings, wrong_unit
 from fingervision.tables.units import factor, known_unit, spelled
 

@@ -13,7 +13,7 @@ from fingervision.domain.errors import DataError, FingervisionError, ModelError,
 from fingervision.models.mechanism_figures import mechanism_figures
 from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.storage.arithmetic import number
+from fingervision.storage.drawing_reader import number
 from fingervision.storage.mechanism_toml import is_mechanism, mechanism_from_tables, read_mechanism
 
 ROOT = Path(__file__).parents[2]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fingervision.domain.errors import UsageError
-from fingervision.storage.result_owner import mark_owner, own_folder
+from fingervision.storage.out_folder import mark_owner, own_folder
 
 
 def test_a_named_folder_with_the_results_of_another_input_is_refused(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from fingervision.demonstration.demonstrate import demonstrate
 from fingervision.domain.errors import DataError, DeviceError, FingervisionError, LimitError, OutputError
-from fingervision.storage.folder_lock import FolderLock
+from fingervision.storage.out_folder import FolderLock
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.testbed.actuator import Actuator, Alarm
 from fingervision.testbed.bed import Bed

@@ -13,8 +13,7 @@ from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import Frame
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.calibration_json import write_calibration
-from fingervision.storage.folder_lock import FolderLock
-from fingervision.storage.out_folder import make_out_folder
+from fingervision.storage.out_folder import FolderLock, make_out_folder
 from fingervision.storage.recorded_video import RecordedVideo
 from fingervision.storage.run_files import CALIBRATION, VIDEO, RunFiles
 from fingervision.storage.samples_csv import SampleRow, SamplesCsv, read_samples, write_rows
