@@ -1,6 +1,5 @@
-"""The reference names every key that the program writes or reads, and figures are those of their scripts."""
+"""The reference names every key that the program writes or reads (declared ones: test_declared_formats.py), and figures are those of their scripts."""
 
-import dataclasses
 import importlib
 import re
 import sys
@@ -9,9 +8,8 @@ from pathlib import Path
 import matplotlib as mpl
 import pytest
 
-from fingervision.domain import gripper
 from fingervision.domain.status import Status
-from fingervision.storage import gaps_csv, mechanism_toml, response_csv, samples_csv, settings_toml
+from fingervision.storage import mechanism_toml, response_csv
 from fingervision.testbed import recipe_kinds
 
 ROOT = Path(__file__).parents[2]
@@ -30,21 +28,10 @@ def keys_in(*paths: str) -> set[str]:
 @pytest.mark.parametrize(
     ("what", "keys"),
     [
-        ("gaps.csv", set(gaps_csv.COLUMNS.split(","))),
         ("status", {str(status) for status in Status}),
-        ("samples.csv", set(samples_csv.COLUMNS.split(","))),
         ("response.csv", set(response_csv.COLUMNS)),
-        ("settings.toml", {*settings_toml.TOP_KEYS, *settings_toml.CAMERA_KEYS}),
         ("report.json", keys_in("fingervision/storage/report_json.py")),
         ("calibration.json", keys_in("fingervision/storage/calibration_json.py") - {"tilt", "value", "stated"}),
-        (
-            "gripper.toml",
-            {
-                field.name
-                for record in (gripper.Material, gripper.Body, gripper.Hinge, gripper.Lever, gripper.Links)
-                for field in dataclasses.fields(record)
-            },
-        ),
         ("mechanism.toml", {*mechanism_toml._TOP, *mechanism_toml._SHAPES, *mechanism_toml._FLEXURES}),
     ],
 )
