@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.field import declared
 from fingervision.domain.measured_table import Channel, MeasuredTable, RecordedPath
 from fingervision.storage.beside import response_note_beside, slots_beside, u_clock_beside
 from fingervision.storage.csv_columns import read_columns
+from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.number_columns import Numbers
 
 UNITS = ("_mm", "_mrad")
@@ -125,7 +127,7 @@ def measured_rows(
             f"{path} must have at least {FEWEST_ROWS} rows with an input and a gap, but has {kept.size}: measure more."
         )
     column = {name: each.value[kept] for name, each in values.items() if each.present[kept].all()}
-    _check_uncertainties(column, kept, path)
+    _check_limits(column, kept, path)
     names = [run_cells[row] for row in kept.tolist()] if run_cells is not None else [""] * kept.size
     count = len(set(names))
     bound = f"at most {MOST_RUNS} runs" if count > MOST_RUNS else "several rows in a run"
@@ -180,14 +182,15 @@ def measured_rows(
     )
 
 
-def _check_uncertainties(column: Mapping[str, NDArray[np.float64]], rows: NDArray[np.intp], path: Path) -> None:
-    """Refuse negative standard uncertainties."""
-    for name, value in column.items():
-        if name.startswith("u_") and value.min() < 0.0:
-            row = int(np.argmin(value))
+def _check_limits(column: Mapping[str, NDArray[np.float64]], rows: NDArray[np.intp], path: Path) -> None:
+    """Refuse numbers beyond the limits of their column, such as negative standard uncertainties."""
+    for each in declared(GapRow):
+        value = column.get(each.name)
+        wrong = [] if value is None else np.flatnonzero((value < each.field.low) | (value > each.field.high))
+        if value is not None and len(wrong):
             raise DataError(
-                f"{name} is a standard uncertainty and must not be negative, but is {value[row]:g} in data row "
-                f"{rows[row] + 1} of {path}: correct it, or leave the column out."
+                f"{each.name} {each.field.refusal(value[wrong[0]])} in data row "
+                f"{rows[wrong[0]] + 1} of {path}: correct it, or leave the column out."
             )
 
 

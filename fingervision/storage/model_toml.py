@@ -1,6 +1,5 @@
 """The file model.toml of a corrected model, and the choice of the reader for each kind of model file."""
 
-import json
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -26,6 +25,7 @@ from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.storage.toml_section import read_document
+from fingervision.storage.toml_text import toml_lines
 
 FMU_KEYS = ("input", "gap", "input_unit", "gap_unit")
 """Keys of an FMU: names of its input and gap, and their units where the FMU declares none."""
@@ -198,26 +198,19 @@ def write_model(
         The name of the base model cannot be written in UTF-8, the encoding of TOML files.
     """
     base = Path(os.path.relpath(base_path.resolve(), path.parent.resolve())).as_posix()
-    lines = ["schema = 1", f"base = {json.dumps(base, ensure_ascii=False)}", *([f'kind = "{kind}"'] if kind else [])]
-    lines += [f"{key} = {json.dumps(name, ensure_ascii=False)}" for key, name in (names or {}).items()]
+    lines = toml_lines({"schema": 1, "base": base, "kind": kind, **(names or {})})
     for name, parameters in effects.items():
         effect, place, end = split_key(name)
-        lines += ["", "[[effect]]", f'name = "{effect}"']
-        lines += [f"place = {json.dumps(place, ensure_ascii=False)}"] if place else []
-        lines += [f"end = {json.dumps(end, ensure_ascii=False)}"] if end else []
         # To read the file, an effect that is not built in must be available.
         origin = origin_of(effect) if effect in catalogue() else None
-        lines += [] if origin is None or origin.built_in else [f"from = {json.dumps(str(origin), ensure_ascii=False)}"]
-        lines.append("[effect.parameters]")
+        source = None if origin is None or origin.built_in else str(origin)
+        lines += toml_lines({"name": effect, "place": place or None, "end": end or None, "from": source}, "[[effect]]")
         inputs, errors = curve_points({key: estimate.value for key, estimate in parameters.items()})
-        if inputs.size:
-            pairs = ", ".join(
-                f"[{at!r}, {error!r}]" for at, error in zip(inputs.tolist(), errors.tolist(), strict=True)
-            )
-            lines.append(f"{POINTS} = [{pairs}]")
-        for key, estimate in parameters.items():
-            if key.startswith("point_"):
-                continue
-            u = "" if estimate.u is None else f", u = {estimate.u!r}"
-            lines.append(f"{key} = {{ value = {estimate.value!r}{u} }}")
+        pairs = [list(pair) for pair in zip(inputs.tolist(), errors.tolist(), strict=True)]
+        stated = {
+            key: {"value": estimate.value} | ({} if estimate.u is None else {"u": estimate.u})
+            for key, estimate in parameters.items()
+            if not key.startswith("point_")
+        }
+        lines += ["[effect.parameters]", *toml_lines({POINTS: pairs or None, **stated})]
     path.write_text(in_utf8(path, "\n".join(lines) + "\n"), encoding="utf-8")

@@ -12,6 +12,7 @@ from fingervision.domain.errors import DataError, OutputError
 from fingervision.storage.durable import replaced
 from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_text import toml_lines
 
 NAME = "columns.toml"
 KINDS = ("measured", "drive", "simulation")
@@ -168,23 +169,16 @@ def entry_of_settings(settings: Sequence[str], source: Path) -> Entry:
 
 def entry_text(table: str, kind: str | None, entry: Entry) -> str:
     """Format an entry as a table of columns.toml."""
-    lines = ["[[table]]", f"file = {_text(table)}"]
-    if kind is not None:
-        lines.append(f'as = "{kind}"')
-    lines += [f"{key} = {_text(value)}" for key, value in entry.words.items()]
-    if entry.header_line is not None:
-        lines.append(f"header_line = {entry.header_line}")
-    if entry.accept:
-        lines.append(f"accept = [{', '.join(_text(word) for word in sorted(entry.accept))}]")
-    lines += [f"columns.{role} = {_text(name)}" for role, name in entry.columns.items()]
-    lines += [f"units.{role} = {_text(unit)}" for role, unit in entry.units.items()]
-    return "\n".join(lines) + "\n"
-
-
-def _text(words: str) -> str:
-    """Quote a text for TOML."""
-    marked = words.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t")
-    return '"' + re.sub(r"[\x00-\x1f\x7f]", lambda mark: f"\\u{ord(mark[0]):04x}", marked) + '"'
+    keys = {
+        "file": table,
+        "as": kind,
+        **entry.words,
+        "header_line": entry.header_line,
+        "accept": sorted(entry.accept) or None,
+        **{f"columns.{role}": name for role, name in entry.columns.items()},
+        **{f"units.{role}": unit for role, unit in entry.units.items()},
+    }
+    return "\n".join(["[[table]]", *toml_lines(keys)]) + "\n"
 
 
 def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
