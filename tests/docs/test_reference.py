@@ -1,4 +1,4 @@
-"""The reference names every key that the program writes or reads (declared ones: test_declared_formats.py), and figures are those of their scripts."""
+"""The reference names every key that no record declares (the others: test_declared_formats.py); figures are drawn."""
 
 import importlib
 import re
