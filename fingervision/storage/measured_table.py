@@ -185,12 +185,13 @@ def measured_rows(
 def _check_limits(column: Mapping[str, NDArray[np.float64]], rows: NDArray[np.intp], path: Path) -> None:
     """Refuse numbers beyond the limits of their column, such as negative standard uncertainties."""
     for each in declared(GapRow):
-        value = column.get(each.name)
-        wrong = [] if value is None else np.flatnonzero((value < each.field.low) | (value > each.field.high))
-        if value is not None and len(wrong):
+        if (value := column.get(each.name)) is None:
+            continue
+        wrong = np.flatnonzero((value < each.field.low) | (value > each.field.high))
+        if wrong.size:
             raise DataError(
-                f"{each.name} {each.field.refusal(value[wrong[0]])} in data row "
-                f"{rows[wrong[0]] + 1} of {path}: correct it, or leave the column out."
+                f"{each.name} {each.field.refusal(value[wrong[0]])} in data row {rows[wrong[0]] + 1} of {path}: "
+                "correct it, or leave the column out."
             )
 
 
