@@ -16,12 +16,15 @@ Examples:
   fingervision diagnose samples.csv --model results/model.toml --out again
   fingervision diagnose samples.csv --model gripper.toml --kind finite_element
   fingervision diagnose samples.csv --model comsol.csv --without lens_distortion --json
+  fingervision diagnose samples.csv --reference healthy.csv --model gripper.toml --out changes
 
 \b
 Files written to --out:
   report.html   the result on one page       report.json   the same as data
   model.toml    the corrected model          next_run.toml recipe of a run that separates what is ambiguous
   gap_against_input, gap_over_time, residuals: plots as .svg and .pdf
+With --reference, instead of these:
+  changes.json   what changed, and where         changes.svg   the drawing, coloured by the evidence
 """
 
 
@@ -34,6 +37,11 @@ Files written to --out:
     default=Path("diagnosis"),
     show_default=True,
     help="Folder for the results.",
+)
+@click.option(
+    "--reference",
+    type=click.Path(path_type=Path),
+    help="Table of the same specimen while it was healthy: say what changed since, and at which hinge.",
 )
 @click.option("--with", "forced", multiple=True, metavar="EFFECT", help="Include this effect in every explanation.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Exclude this effect from every explanation.")
@@ -52,6 +60,7 @@ def command(
     measured: Path,
     model_path: Path,
     out: Path,
+    reference: Path | None,
     forced: tuple[str, ...],
     without: tuple[str, ...],
     seed: int,
@@ -63,6 +72,11 @@ def command(
     import json
     import sys
 
+    if reference is not None:
+        if forced or without:
+            raise click.UsageError("--with and --without name effects, and cannot be given together with --reference.")
+        _changes(measured, reference, model_path, out, kind, columns, as_json=as_json)
+        return
     from fingervision.diagnosis.report.answer_files import PAGE
     from fingervision.interface.diagnosis import diagnose
     from fingervision.storage.out_folder import new_out_folder
@@ -83,3 +97,19 @@ def command(
         )
     document = done.write(out)
     click.echo(json.dumps(document, indent=2) if as_json else f"{done.sentences()}\n  {out / PAGE}")
+
+
+def _changes(
+    measured: Path, reference: Path, model: Path, out: Path, kind: str, columns: Path | None, *, as_json: bool
+) -> None:
+    """Compare with a healthy recording, and print what changed."""
+    import json
+
+    from fingervision.interface.healthy_reference import CHANGES, changes_since
+    from fingervision.storage.out_folder import new_out_folder
+
+    out = results_folder(out, measured)
+    with new_out_folder(out):
+        done = changes_since(measured, reference, model, kind=kind, columns=columns, call=running_command())
+        document = done.write(out)
+    click.echo(json.dumps(document, indent=2) if as_json else f"{done.sentences()}\n  {out / CHANGES}")

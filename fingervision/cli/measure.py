@@ -33,6 +33,7 @@ Files written to --out:
   summary.json  counts, statistics, settings, scale, what the uncertainty includes and what not
   gap.png       the gap over time
   bodies.csv    with --mechanism: pose and status of every body and hinge, frame by frame
+  flexures.csv  with --mechanism: thickness and place of every flexure at rest
   gauges.csv    with --gauges: one row per value, time_s,gauge,quantity,value,u,unit,status
   overlay.mp4   with --overlay: video with edges, tips, points and value drawn in
   steps/        with --steps: a picture of every processing step

@@ -86,7 +86,12 @@ CASES = {
     ),
     "diagnose": Case(
         "which effect a simulation lacks in comparison with a measured table",
-        {**PAPER_RUN, **PAPER, "corrected/model.toml": f"{OWN}examples/diagnose/model.toml"},
+        {
+            **PAPER_RUN,
+            **PAPER,
+            "corrected/model.toml": f"{OWN}examples/diagnose/model.toml",
+            "healthy.csv": PAPER_RUN["samples.csv"],
+        },
         "fingervision diagnose samples.csv --model comsol.csv --out results",
     ),
     "model": Case(

@@ -25,12 +25,14 @@ from fingervision.measuring.drawing_placement import (
     levels_of,
     refined,
 )
+from fingervision.measuring.flexure_outlines import StillPicture, flexures_at_rest
 from fingervision.measuring.joined_bodies import Joint, torn_off
 from fingervision.measuring.pose_uncertainty import SharedErrors, SharedPose, in_drawing
 from fingervision.measuring.scale import Scale
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import column_name
 from fingervision.storage.bodies_csv import add_channels, write_bodies
+from fingervision.storage.flexures_csv import FLEXURES, write_flexures
 from fingervision.vision.outline_chunks import Chunks, EdgeView, FlatMap
 from fingervision.vision.pipeline import Settings
 from fingervision.vision.response_shift import u_edge_px
@@ -84,6 +86,9 @@ uncertainties above which a size error is significant. Printed parts and scales 
 the scale or the drawing is wrong.
 """
 BODIES, GAPS = "bodies.csv", "gaps.csv"
+STILL_FRAMES = 8
+"""Largest number of frames from which the flexures are measured at rest: noise then adds little to the uncertainty that
+all still frames share."""
 LAID_BY_ALL = (
     "no fixed body is in view, so that the drawing was placed by all bodies together: poses are relative to the "
     "bodies' mean position in the first frame instead of the ground, and only their changes and the angles of hinges "
@@ -138,6 +143,7 @@ class BodyTracker:
         self._joints = [Joint(flexure, (self._joined(flexure.name, -1.0).body, self._joined(flexure.name, 1.0).body))
                         for flexure in mechanism.flexures]  # fmt: skip
         self.placed: Placed | None = None
+        self.first: list[StillPicture] = []
 
     def poses(self, frames: Iterable[Frame | LostFrame]) -> Iterator[FramePoses]:
         """Yield the poses for each frame; the first readable frame determines the position of the drawing.
@@ -155,7 +161,11 @@ class BodyTracker:
             grey = np.asarray(picture.grey if picture.light is None else picture.light[picture.grey], dtype=np.float64)
             if self.placed is None:
                 self._place(grey, item.index, self._view(picture), picture)
-            yield FramePoses(item.index, item.time_s, self._seen(grey, self._view(picture)))
+            view = self._view(picture)
+            if len(self.first) < STILL_FRAMES and self.placed is not None:
+                body, contrast = self._levels
+                self.first.append(StillPicture(grey, self.placed.place, body, body + contrast, view.outward_px))
+            yield FramePoses(item.index, item.time_s, self._seen(grey, view))
 
     def _names(self) -> list[str]:
         bodies = [outline.body.name for outline in self.outlines]
@@ -349,6 +359,7 @@ def measure_bodies(
     tracker = BodyTracker(mechanism, scale, points, settings)
     poses = list(tracker.poses(source))
     write_bodies(out / BODIES, poses)
+    write_flexures(out / FLEXURES, flexures_at_rest(tracker.first, mechanism.flexures))
     gaps = out / GAPS
     if gaps.is_file():
         moving = [outline.body.name for outline in tracker.outlines if not outline.body.is_fixed]

@@ -33,6 +33,38 @@ SCALE_ERROR = 3e-4
 (measuring.md)."""
 
 
+class RandomEffects:
+    """Nuisance parameters with normal priors, beside which other signals are fitted.
+
+    Parameters
+    ----------
+    columns : sequence of (ndarray of float, shape (n,), float)
+        Whitened change of all rows per unit of each parameter, and the parameter's prior standard deviation; infinite
+        if nothing is known.
+    """
+
+    def __init__(self, columns: Sequence[tuple[Array, float]]) -> None:
+        whitened = np.array([column for column, _ in columns]).T
+        self._unit = np.maximum(np.linalg.norm(whitened, axis=0), 1e-300)
+        bounded = np.array([0.0 if not np.isfinite(sd) else 1.0 / sd for _, sd in columns])
+        # A prior is one more row of the least-squares problem for each parameter.
+        stacked = np.vstack([whitened / self._unit, np.diag(bounded / self._unit)])
+        self._basis, self._triangle = np.linalg.qr(stacked)
+
+    def _padded(self, signal: Array) -> Array:
+        return np.concatenate([signal, np.zeros(self._basis.shape[0] - signal.size)])
+
+    def beside(self, signal: Array) -> Array:
+        """Project a whitened signal on the space orthogonal to the parameters."""
+        padded = self._padded(signal)
+        return np.asarray(padded - self._basis @ (self._basis.T @ padded))
+
+    def shares(self, signal: Array) -> Array:
+        """Fit the parameters to a whitened signal."""
+        fitted = np.linalg.lstsq(self._triangle, self._basis.T @ self._padded(signal), rcond=None)[0]
+        return np.asarray(fitted / self._unit)
+
+
 class PlaceNuisances:
     """Regressors of the nuisance parameters, with prior standard deviations; infinite if nothing is known.
 
@@ -104,18 +136,14 @@ class PlaceNuisances:
                 columns.append(own)
                 spread.append(HINGE_ERROR)
         whitened = np.array([noise.whitened(column) for column in columns]).T
-        size = np.maximum(np.linalg.norm(whitened, axis=0), 1e-300)
-        bounded = np.array([0.0 if not np.isfinite(s) else 1.0 / s for s in spread])
-        self._columns, self._unit = columns, size
+        self._columns = columns
         self._is_free = [not np.isfinite(s) for s in spread]
-        stacked = np.vstack([whitened / size, np.diag(bounded / size)])
-        self._basis, self._triangle = np.linalg.qr(stacked)
-        self._rows, self._noise = whitened.shape[0], noise
+        self._effects = RandomEffects(list(zip(whitened.T, spread, strict=True)))
+        self._noise = noise
 
     def beside(self, signal: Array) -> Array:
         """Project a whitened signal on the space orthogonal to the nuisance parameters."""
-        padded = np.concatenate([signal, np.zeros(self._basis.shape[0] - signal.size)])
-        return np.asarray(padded - self._basis @ (self._basis.T @ padded))
+        return self._effects.beside(signal)
 
     def unknown_part(self, rows: Array) -> Array:
         """Fit of the nuisance parameters to a residual; returns the part of constants, rotation and bend only.
@@ -125,7 +153,6 @@ class PlaceNuisances:
         Possible model errors are fitted too, but stay in the residual, because they may be the disagreement to be
         found.
         """
-        padded = np.concatenate([self._noise.whitened(rows), np.zeros(self._basis.shape[0] - self._rows)])
-        shares = np.linalg.lstsq(self._triangle, self._basis.T @ padded, rcond=None)[0] / self._unit
+        shares = self._effects.shares(self._noise.whitened(rows))
         free = [s * column for s, column, is_free in zip(shares, self._columns, self._is_free, strict=True) if is_free]
         return np.asarray(np.sum(free, axis=0))
