@@ -156,7 +156,7 @@ def solid_answer(mechanism: Mechanism, mesh: PlaneMesh, *, layers: int = 4, mode
     sign = driven.direction[along - 1]
     kept = [f"DRIVE,{3 - along},{3 - along}"] if across else []
     spread = np.ptp(body.nodes_mm[drive - 1][:, :2], axis=0)
-    in_mean = not across and spread[along - 1] > _ON * size_mm
+    in_mean = not across and (driven.turns == "free" or spread[along - 1] > _ON * size_mm)
     pushed, reacting = f"DRIVE,{along},{along},{sign:g}", ["DRIVE"]
     unequal = list(lines)
     if in_mean:

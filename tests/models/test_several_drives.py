@@ -171,7 +171,7 @@ def test_a_drawing_in_metres_or_micrometres_is_asked_about(scale: float) -> None
     other = lengths.sub(
         lambda line: re.sub(r"-?\d+\.?\d*", lambda n: repr(scale * float(n.group())), line.group()), ARMS
     )
-    with pytest.raises(FingervisionError, match=r"must be 0.3 to 5000 mm large, but is .* millimetres"):
+    with pytest.raises(FingervisionError, match=r"must be 0.3 to 5000 mm large, but .* are its lengths (micro)?metres"):
         drawn(other)
 
 
