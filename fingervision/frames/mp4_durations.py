@@ -203,7 +203,10 @@ def _contradicts(track: _Track, film_scale: int) -> bool:
     shown_s = (track.shown - track.empty) / film_scale
     there_s = (track.ticks - track.skipped) / track.scale
     slack_s = longest / track.scale + 1.0 / film_scale
-    if shown_s > there_s + slack_s:
+    # A track that states the sum of its durations (FFmpeg of PyAV 19) is shown for longer, where pictures with uneven
+    # times are stored in another order than they are shown.
+    reordered_s = (max(0, track.presented - track.ticks) if track.ticks == total else 0) / track.scale
+    if shown_s > there_s + reordered_s + slack_s:
         return True
     # A shorter duration means that the film was cut, or that one byte of the ticks per second is damaged.
     is_cut = there_s > shown_s + slack_s

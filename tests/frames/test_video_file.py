@@ -52,6 +52,20 @@ def test_times_are_the_containers_own_also_at_a_changing_rate(tmp_path: Path, su
     assert [item.time_s for item in found] == pytest.approx(UNEVEN_TIMES_S, abs=tick_s)
 
 
+def test_a_track_may_state_the_sum_of_its_durations_or_the_time_that_it_is_shown(tmp_path: Path) -> None:
+    # FFmpeg of PyAV 19 states the sum; with uneven times and another order of storage it is shorter than what is shown.
+    path = tmp_path / "clip.mp4"
+    write_clip(path, timed(smooth_pictures(8), UNEVEN_TIMES_S), H264())
+    content = bytearray(path.read_bytes())
+    at = content.index(b"mdhd") + 4 + 4 + 8 + 4  # version and flags, two dates, ticks a second
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        total = sum(packet.duration or 0 for packet in container.demux(stream))
+    content[at : at + 4] = total.to_bytes(4, "big")
+    path.write_bytes(content)
+    assert [item.time_s for item in read(path)] == pytest.approx(UNEVEN_TIMES_S, abs=MP4_TICK_S)
+
+
 def test_luma_of_a_lossless_grey_clip_is_the_frame_itself(tmp_path: Path) -> None:
     levels = pictures(3, size=(47, 61))  # rows are padded in the decoder's memory
     write_clip(tmp_path / "clip.mkv", timed(levels), Ffv1())
