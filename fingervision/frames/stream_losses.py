@@ -8,6 +8,7 @@ import av
 
 from fingervision.frames.damage import DamageTrail
 from fingervision.frames.h264_numbers import CodedPicture, H264Numbers
+from fingervision.frames.told_times import TICKS
 from fingervision.frames.transport_stream import MISSING, TransportLosses
 
 # Check that a coded picture follows its reference picture: a lost picture leaves a hole in the frame numbers.
@@ -51,6 +52,7 @@ class ReferenceChain:
         self._before: CodedPicture | None = None  # last reference picture
         self._steps: deque[int] = deque(maxlen=STEPS)
         self._tick: int | None = None
+        self._is_even = True  # whether the last steps agree
         self._since_key, self._has_seen_key = 0, False
         self._key_every: int | None = None
         # Picture number at which the recovery is complete, and number of pictures since its start.
@@ -97,7 +99,8 @@ class ReferenceChain:
     def _may_hide_a_key(self, before: CodedPicture, missing: int, modulus: int) -> bool:
         """Whether a loss may be undetectable, because after a reset or a full cycle the numbers are the same."""
         if missing >= modulus:
-            return True
+            # Where the times are uneven anyway, the camera paused: a loss agrees with the numbers by chance only.
+            return self._is_even
         # A camera that halves its rate in the dark leaves the same gap in the times at any picture; only where a key
         # picture is due by the distance of those before, may it be one that is missing.
         is_due = self._key_every is not None and self._since_key + 1 + missing >= self._key_every
@@ -110,6 +113,7 @@ class ReferenceChain:
         if step is None or step <= 0:
             return 0
         usual = median(self._steps) if self._steps else step
+        self._is_even = all(abs(one - usual) <= TICKS for one in self._steps)
         self._steps.append(step)
         return round(step / usual) - 1 if step > LEAP_SHARE * usual else 0
 

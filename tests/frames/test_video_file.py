@@ -48,7 +48,7 @@ def test_times_are_the_containers_own_also_at_a_changing_rate(tmp_path: Path, su
     path = tmp_path / f"clip{suffix}"
     write_clip(path, timed(smooth_pictures(8), UNEVEN_TIMES_S), H264())
     found = read(path)
-    assert [item.index for item in found] == list(range(8))
+    assert statuses(found) == [Status.OK] * 8
     assert [item.time_s for item in found] == pytest.approx(UNEVEN_TIMES_S, abs=tick_s)
 
 
