@@ -125,8 +125,27 @@ OWN_FILES = (MARK, "batch.csv", "batch.png", "index.html")
 
 
 @dataclass(frozen=True, slots=True)
+class Row:
+    """An input of a list, which may state options of its own.
+
+    Parameters
+    ----------
+    input : str
+        The recording or the table.
+    arguments : tuple of str
+        The command's options for this input, without --out.
+    options_key : str
+        As in `Job`.
+    """
+
+    input: str
+    arguments: tuple[str, ...]
+    options_key: str
+
+
+@dataclass(frozen=True, slots=True)
 class Job:
-    """The user's request: one command with the same options on many inputs.
+    """The user's request: one command on many inputs, with the same options or with those of a list.
 
     Parameters
     ----------
@@ -140,6 +159,8 @@ class Job:
         Hash of the options, the files that they name, and the version.
     out : Path
         Folder of all results.
+    rows : tuple of Row
+        The rows of a list, which replaces `inputs`.
     """
 
     command: str
@@ -147,6 +168,18 @@ class Job:
     arguments: tuple[str, ...]
     options_key: str
     out: Path
+    rows: tuple[Row, ...] = ()
+
+    def each(self) -> tuple[Row, ...]:
+        """Every input with its options.
+
+        Raises
+        ------
+        InputFileError, UsageError
+            No input matches, or all are in the result folder.
+        """
+        names = () if self.rows else inputs_of(self.inputs, self.out)
+        return self.rows or tuple(Row(name, self.arguments, self.options_key) for name in names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,9 +259,9 @@ def planned(job: Job) -> Plan:
     OutputError
         Nothing matches, or the folder for the results holds something else. Nothing is written yet.
     """
-    names = inputs_of(job.inputs, job.out)
+    rows = job.each()
     _check_folder(job)
-    paths = [os.path.abspath(name) for name in names]  # noqa: PTH100 - links keep their own names
+    paths = [os.path.abspath(row.input) for row in rows]  # noqa: PTH100 - links keep their own names
     wanted = set(paths)
     home: dict[str, tuple[Path, Record]] = {}
     taken: list[str] = list(OWN_FILES)
@@ -241,12 +274,12 @@ def planned(job: Job) -> Plan:
     fresh = dict(zip(new, folder_names([Path(path) for path in new], taken), strict=True))
     tasks: list[Task] = []
     done: dict[int, Outcome] = {}
-    for number, (name, path) in enumerate(zip(names, paths, strict=True)):
+    for number, (row, path) in enumerate(zip(rows, paths, strict=True)):
         folder, record = home[path] if path in home else (job.out / fresh[path], None)
-        tasks.append(Task(job.command, name, job.arguments, folder, job.options_key))
-        same = record is not None and record.options_key == job.options_key and _is_untouched(record, path)
+        tasks.append(Task(job.command, row.input, row.arguments, folder, row.options_key))
+        same = record is not None and record.options_key == row.options_key and _is_untouched(record, path)
         if record is not None and same and is_whole(folder, record):
-            done[number] = outcome_of(name, folder, record)
+            done[number] = outcome_of(row.input, folder, record)
     return Plan(job, tuple(tasks), done)
 
 

@@ -1,16 +1,17 @@
 """`fingervision batch`: measure or diagnose many inputs, on all cores of this computer or on a Dask cluster."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from fingervision.cli import cli
-from fingervision.domain.errors import FingervisionError, InputFileError, StateError
+from fingervision.domain.errors import ExitCode, FingervisionError, InputFileError, StateError, UsageError
 
 if TYPE_CHECKING:
-    from fingervision.batch.run import Batch, Plan
+    from fingervision.batch.run import Batch, Plan, Row
     from fingervision.batch.task import Perform
 
 EXAMPLES = """
@@ -20,6 +21,13 @@ Examples:
   fingervision batch measure recordings/first/*.mp4 recordings/second/*.mp4 --px-per-mm 34 --jobs 2 --out others
   fingervision batch measure '/lab/**/*.mkv' --calibration /lab/c.json --scheduler tcp://head:8786 --out /lab/results
   fingervision batch diagnose 'runs/*/samples.csv' --model comsol.csv --out diagnoses
+  fingervision batch measure --list runs.csv --out day
+  fingervision batch diagnose --list runs.csv --results day --out explained
+
+\b
+A list is a CSV table with a row for each input: recording (or measured, for diagnose) and any options as columns
+(drive,calibration,model,px_per_mm,...). Files are relative to the list; empty cells state nothing; options given here
+hold for all rows that do not state them. With --results, diagnose takes the gaps that batch measure wrote.
 
 \b
 Put patterns in quotes; ** stands for any folders. Give the same command again to continue after a crash or Ctrl-C: it
@@ -37,8 +45,9 @@ Files written to --out:
 Exit codes: 0 all done; 1 no input could be processed, or the batch was stopped; 2 wrong usage; 3 done, but some inputs
 were damaged or could not be processed: each is listed with its message.
 """
-OWN = ("inputs", "out", "scheduler", "jobs", "as_json")
+OWN = ("inputs", "list_file", "results", "out", "scheduler", "jobs", "as_json")
 BAD_SHOWN = 10
+COMMANDS = ("measure", "diagnose")
 
 
 @click.group(epilog=EXAMPLES)
@@ -46,13 +55,33 @@ def command() -> None:
     """Run one command on many inputs, with a result folder for each input and an overview of all results."""
 
 
-def _batch_of(name: str) -> click.Command:
-    """Make a batch command that has the options of the single command and those of a batch."""
+def _options_of(name: str) -> list[click.Option]:
+    """Options of the single command that a batch takes too; what that command requires may stand in a list."""
     single = cli.get_command(click.Context(cli), name)
     assert single is not None  # noqa: S101 - named below
     options = [
-        option for option in single.params if isinstance(option, click.Option) and option.name not in ("out", "as_json")
+        copy(option)
+        for option in single.params
+        if isinstance(option, click.Option) and option.name not in ("out", "as_json")
     ]
+    for option in options:
+        if option.required:
+            option.required, option.callback = False, _if_stated(option.callback)
+    return options
+
+
+def _if_stated(callback: Callable[..., Any] | None) -> Callable[..., Any]:
+    """Let an option's own check see only values that the command line states."""
+
+    def checked(context: click.Context, option: click.Parameter, value: Any) -> Any:
+        return callback(context, option, value) if callback is not None and value else value
+
+    return checked
+
+
+def _batch_of(name: str) -> click.Command:
+    """Make a batch command that has the options of the single command and those of a batch."""
+    options = _options_of(name)
 
     def callback(**chosen: Any) -> None:
         context = click.get_current_context()
@@ -61,14 +90,27 @@ def _batch_of(name: str) -> click.Command:
             for option in options
             if context.get_parameter_source(str(option.name)) is not click.core.ParameterSource.DEFAULT
         }
-        _run(name, given, **{key: chosen[key] for key in OWN})
+        _run(name, options, given, **{key: chosen.get(key) for key in OWN})
 
+    results = [
+        click.Option(
+            ["--results"],
+            type=click.Path(path_type=Path),
+            help="Folder of `batch measure`, whose gaps of the list's recordings are diagnosed.",
+        )
+    ]
     return click.Command(
         name,
         callback=callback,
         params=[
-            click.Argument(["inputs"], nargs=-1, required=True, metavar="INPUT..."),
+            click.Argument(["inputs"], nargs=-1, metavar="[INPUT...]"),
             *options,
+            click.Option(
+                ["--list", "list_file"],
+                type=click.Path(path_type=Path),
+                help="CSV table with a row for each input, in place of INPUT.",
+            ),
+            *(results if name == "diagnose" else ()),
             click.Option(
                 ["--scheduler"],
                 metavar="tcp://HOST:PORT",
@@ -89,8 +131,11 @@ def _batch_of(name: str) -> click.Command:
 
 def _run(
     name: str,
+    options: Sequence[click.Option],
     given: Mapping[click.Option, Any],
     inputs: tuple[str, ...],
+    list_file: Path | None,
+    results: Path | None,
     out: Path,
     scheduler: str | None,
     jobs: int | None,
@@ -105,27 +150,55 @@ def _run(
     from fingervision.cli._unattended import perform
 
     if scheduler is not None and jobs is not None:
-        from fingervision.domain.errors import UsageError
-
         raise UsageError(
             "--jobs is for this computer and --scheduler for a cluster, but both are given: leave one out."
         )
-    arguments = tuple(_arguments(given, absolute=scheduler is not None))
-    plan = planned(Job(name, inputs, arguments, _options_key(name, given), out))
+    if bool(inputs) == (list_file is not None) or (results is not None and list_file is None):
+        raise UsageError(
+            "The inputs must be named one way, as INPUT... or by --list FILE (and --results DIR only with a list), but "
+            f"{'both are' if inputs and list_file else 'neither is' if not inputs else '--results is'} given: correct "
+            "the command."
+        )
+    is_far = scheduler is not None
+    rows = () if list_file is None else _rows_of(list_file, name, options, given, results, is_far=is_far)
+    arguments = tuple(_arguments(given, absolute=is_far))
+    plan = planned(Job(name, inputs, arguments, "" if rows else _options_key(name, given), out, rows))
     with ExitStack() as stack:
         crew: Crew
         if scheduler is None or not plan.to_do:
             local = stack.enter_context(LocalCrew(perform, min(jobs or len(cores()), len(plan.to_do))))
             crew = local.outcomes_of
-            if plan.to_do:
+            if plan.to_do and not rows:
                 _check_options(name, arguments, local.answer)
         else:
-            _check_options(name, arguments, perform)
+            if not rows:
+                _check_options(name, arguments, perform)
             crew = partial(cluster.outcomes_of, stack.enter_context(cluster.connected(scheduler)), perform=perform)
         show = stack.enter_context(_Bar(name, len(plan.to_do)))
         batch = run(plan, crew, show)
     _report(plan, batch, as_json)
     raise SystemExit(int(batch.exit_code))
+
+
+def _rows_of(
+    path: Path,
+    name: str,
+    options: Sequence[click.Option],
+    given: Mapping[click.Option, Any],
+    results: Path | None,
+    *,
+    is_far: bool,
+) -> tuple["Row", ...]:
+    """Read a list; options of the command hold for every row that does not state them."""
+    from fingervision.batch.run import Row
+    from fingervision.cli._batch_list import listed_runs
+
+    others = [option for other in COMMANDS if other != name for option in _options_of(other)]
+    rows = []
+    for each in listed_runs(path, name, options, others, results):
+        stated = {**given, **each.options}
+        rows.append(Row(each.input, tuple(_arguments(stated, absolute=is_far)), _options_key(name, stated)))
+    return tuple(rows)
 
 
 def _arguments(given: Mapping[click.Option, Any], *, absolute: bool) -> list[str]:
@@ -182,8 +255,6 @@ def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> Non
     The command is called with a nonexistent input; if the options are valid, the only error is that about this input.
     """
     from tempfile import TemporaryDirectory
-
-    from fingervision.domain.errors import ExitCode, UsageError
 
     with TemporaryDirectory() as nowhere:
         try:
@@ -270,5 +341,5 @@ def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:
         click.echo(f"fingervision: {batch.stopped}", err=True)
 
 
-for _name in ("measure", "diagnose"):
+for _name in COMMANDS:
     command.add_command(_batch_of(_name))

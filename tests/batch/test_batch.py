@@ -331,3 +331,53 @@ def test_a_worker_that_is_killed_costs_nothing(recordings: Path, tmp_path: Path)
     assert (running.returncode, err) == (0, "")
     assert len(made(tmp_path / "out")) == len(lines(tmp_path / "out")) == 4
     assert not list((tmp_path / "out").glob(".*.part*"))
+
+
+def test_a_list_states_options_for_each_recording(copy: Path, run: Run, tmp_path: Path) -> None:
+    (copy / "runs.csv").write_text(
+        "# a day\nrecording,px_per_mm,tips,model\na/good.mkv,40,,none.csv\nb/good.mkv,,up,none.csv\nb/broken.mkv,,,\n"
+    )
+    code, _, said = run("batch", "measure", "--list", copy / "runs.csv", *ALONE, "--out", "day")
+    assert code == 3
+    assert "broken.mkv" in said
+    first, second, broken = lines(tmp_path / "day")
+    alone = [run("measure", copy / name, "--px-per-mm", scale, "--out", out)[0] for name, scale, out in (
+        ("a/good.mkv", "40", "one"), ("b/good.mkv", "20", "two"),
+    )]  # fmt: skip
+    assert alone == [0, 0]
+    for row, out in ((first, "one"), (second, "two")):
+        folder = tmp_path / "day" / row["result"]
+        assert (folder / "gaps.csv").read_bytes() == (tmp_path / out / "gaps.csv").read_bytes()
+    assert broken["result"] == ""
+    # A changed cell repeats that recording alone.
+    (copy / "runs.csv").write_text("recording,px_per_mm,tips\na/good.mkv,41,\nb/good.mkv,,up\n")
+    code, told, _ = run("batch", "measure", "--list", copy / "runs.csv", *ALONE, "--out", "day")
+    assert (code, "1 processed" in told) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("table", "fact"),
+    [
+        ("recording,drve\na/good.mkv,x\n", "drive"),
+        ("recording,px_per_mm\na/good.mkv,abc\n", "line 2"),
+        ("recording\na/good.mkv\na/good.mkv\n", "lines 2 and 3"),
+        ("recording,tips\n,up\n", "line 2"),
+        ("recording\n", "at least one"),
+        ("film\na/good.mkv\n", "film"),
+    ],
+)
+def test_a_wrong_list_is_refused_before_anything_is_written(
+    copy: Path, run: Run, tmp_path: Path, table: str, fact: str
+) -> None:
+    (copy / "runs.csv").write_text(table)
+    code, _, said = run("batch", "measure", "--list", copy / "runs.csv", *ALONE, "--out", "day")
+    assert (code, fact in said) == (1, True), said
+    assert not (tmp_path / "day").exists()
+
+
+def test_inputs_are_named_one_way(copy: Path, run: Run) -> None:
+    for arguments in ((), (copy / "a" / "good.mkv", "--list", copy / "runs.csv")):
+        code, _, said = run("batch", "measure", *arguments, *ALONE, "--out", "day")
+        assert (code, "--list" in said) == (2, True)
+    code, _, said = run("batch", "diagnose", "--list", copy / "runs.csv", "--results", copy / "none", "--out", "why")
+    assert code == 1
