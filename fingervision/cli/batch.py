@@ -90,7 +90,7 @@ def _batch_of(name: str) -> click.Command:
             for option in options
             if context.get_parameter_source(str(option.name)) is not click.core.ParameterSource.DEFAULT
         }
-        _run(name, options, given, **{key: chosen.get(key) for key in OWN})
+        _run(name, options, given, **{"results": None, **{key: chosen[key] for key in OWN if key in chosen}})
 
     results = [
         click.Option(
