@@ -34,11 +34,7 @@ NEGATIVE_WING, COMA = 0.08, 0.15
 LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
 # Share of a curve's displacement of an edge that is added to the uncertainty for curves of no family: their error in
 # recordings of log, film and S-curves (tests/benchmarks/unknown_cameras.py).
-FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15, Coding.INTERFRAME: 0.3}
-# Least weight of another curve beside a linear one: the smoothing of a codec that predicts from other pictures hides a
-# curve in one of ten recordings, and the whole displacement is then the error (2 u with u^2 = 1/4).
-LEAST_UNLIKE_LINEAR = {Coding.LOSSLESS: 0.0, Coding.INTRAFRAME: 0.0, Coding.INTERFRAME: 0.25}
-
+FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15}
 REMEDY = "calibrate with bars of three widths, give the curve with --response, or switch the picture profile off"
 NO_FLANKS = (
     "The camera's response could not be learnt, because no straight flank of a finger shows both its plateaus "
@@ -48,6 +44,11 @@ SHARPENED = (
     "The camera sharpens its pictures (its point spread has negative wings, {share:.0%} of the light), which hides its "
     "tone curve: nothing is corrected, and u_shift_px contains a usual tone curve. Switch sharpening off, or "
     f"{REMEDY}."
+)
+# A third of the sRGB recordings through H.264 were called linear (tests/benchmarks/unknown_cameras.py).
+HIDDEN = (
+    "The camera's response was not learnt, because a codec that predicts pictures from others (H.264) smooths edges in "
+    f"a way that hides a tone curve: u_shift_px contains another usual response. Record losslessly, or {REMEDY}."
 )
 MISFIT = (
     "The shape of the edges is that of no usual tone curve (the residuals are {misfit:.1f} times their uncertainty), "
@@ -101,6 +102,8 @@ def learnt_from_profiles(profiles: list[EdgeProfile], prior: CameraModel, coding
     )
     if prior.response.is_known:
         return camera
+    if coding is Coding.INTERFRAME:
+        return replace(camera, response=replace(prior.response, words=HIDDEN))
     response = _response(fits, coding)
     if response.curve.white != assumed.white:  # a video of studio range stays clipped at its white
         response = replace(response, curve=replace(response.curve, white=assumed.white))
@@ -133,8 +136,6 @@ def _response(fits: Sequence[FamilyFit], coding: Coding) -> ResponseEstimate:
     others = [OtherResponse(other, weight) for other, weight in found.others]
     if found.curve is not standard_response("linear"):
         others.append(OtherResponse(standard_response("linear"), FOREIGN_CURVE[coding] ** 2))
-    elif (left := LEAST_UNLIKE_LINEAR[coding] - sum(other.weight for other in others)) > 0.0:
-        others.append(OtherResponse(standard_response("srgb"), left))
     return ResponseEstimate(found.curve, tuple(others), Origin.LEARNT)
 
 
