@@ -119,8 +119,8 @@ def test_another_cameras_calibration_is_said(bench: tuple[Path, list[str], list[
         ("level,light\n0,0\n128,0.2\n255,1\n", "at least"),
         ("level,light\n" + "\n".join(f"{k},{k % 7}" for k in range(256)), "rise"),
         ("level,light\n" + "\n".join(f"{k},{k}" for k in range(100)), "full scale"),
-        ("level,light\n0,zero\n", "two numbers"),
-        ("grey,light\n0,0\n", "level,light"),
+        ("level,light\n0,zero\n", "line 2"),
+        ("grey,light\n0,0\n", "column level"),
         ("level,light\n" + "\n".join(f"{k},{k}" for k in range(0, 1024, 33)), "1023"),
     ],
 )

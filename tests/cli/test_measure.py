@@ -186,7 +186,7 @@ def test_a_calibration_for_other_frames_is_refused(run: Run, clip: Path) -> None
         (("CLIP", *SCALE, "--rate-hz", "25"), 2, "is a video with its own times: leave --rate-hz out."),
         (("CLIP", *SCALE, "--steps", "-1"), 2, "must be the number of a frame, from 0, but is -1"),
         (("CLIP", *SCALE, "--steps", "99"), 2, "--steps must be the number of a frame that can be read, 0 to 11"),
-        (("CLIP", *SCALE, "--drive", "none.csv"), 1, "There is no drive table none.csv."),
+        (("CLIP", *SCALE, "--drive", "none.csv"), 1, "There is no table none.csv."),
         (("CLIP", "--calibration", "none.json"), 1, "There is no calibration file none.json"),
         (("CLIP", *SCALE, "--out", "taken"), 1, "--out must be a folder, but taken is a file: name another."),
         (("CLIP", *SCALE, "--out", "/proc/nowhere"), 1, "The folder /proc/nowhere cannot be written"),

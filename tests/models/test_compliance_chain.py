@@ -57,10 +57,10 @@ def test_the_plane_and_the_space_do_not_mix(gripper: Gripper) -> None:
 def test_grip_force_starts_at_the_object(gripper: Gripper) -> None:
     model = StiffnessMatrixGripper(gripper)
     # The corner, 0.3 mm above the measuring point, moves a little more than the measuring point.
-    touching = 0.25 * (model.first_touch_mm() or 0.0)
+    touching = 0.25 * (model.first_touch_mm or 0.0)
     assert model.grip_force_n(touching, Part(3.0)) == pytest.approx(0.0, abs=1e-12)
     assert model.grip_force_n(touching + 0.1, Part(3.0)) == 0.0
-    expected = 0.1 * -2.0 / (model.first_touch_mm() or 0.0) * model.finger_stiffness_n_mm
+    expected = 0.1 * -2.0 / (model.first_touch_mm or 0.0) * model.finger_stiffness_n_mm
     assert model.grip_force_n(touching - 0.1, Part(3.0)) == pytest.approx(expected)
     # A part as stiff as both fingers in series halves the grip.
     soft = Part(3.0, 0.5 * model.finger_stiffness_n_mm)
