@@ -79,3 +79,6 @@ def changes_since(faulty: Path, healthy: Path, model: Path, *, kind: str, column
     outlines = flexures_beside(healthy), flexures_beside(faulty)
     found = compare_with_healthy(tables[0].value, tables[1].value, given.value, outlines)
     return Changes(found, tables[0].path, provenance(files, call))
+
+
+__all__ = ["CHANGES", "Changes", "changes_since"]

@@ -113,7 +113,7 @@ def test_other_depths_agree_within_their_uncertainty(form) -> None:
 @pytest.mark.parametrize(
     ("source", "facts"),
     [
-        ([picture()], "list"),
+        ({"frame": picture()}, "dict"),
         (None, "None"),
         (3.5, "float"),
         (picture().astype(complex), "complex128"),
