@@ -26,6 +26,8 @@ from fingervision.testing import ActuatorContract, checks_of, run
 from tests.testbed.stages.stage_cases import CAMERA, CASES, Case
 
 # pyserial does not close the socket of a `socket://` port whose other end has closed it.
+# The whole contract, and runs of 300 frames that are unplugged or killed, are marked long: with ten kinds they take
+# minutes, and have not been seen to pass for every kind yet.
 pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
 # The computer may be loaded by other tests.
 PATIENCE_S = 240.0
@@ -87,6 +89,7 @@ def recipe_at(folder: Path) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_stage_keeps_the_contract(case: Case, device: Any, tmp_path: Path) -> None:
     path = str(case.bed_at(tmp_path, device))
     first = open_bed(path)
@@ -165,6 +168,7 @@ def test_lost_steps_are_an_alarm_until_the_stage_is_homed(device: Any, bed: Bed)
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_run_that_is_unplugged_loses_nothing_and_goes_on(case: Case, device: Any, tmp_path: Path) -> None:
     has_a_cable(device)
     path, out = str(case.bed_at(tmp_path, device, CAMERA)), tmp_path / "run"
@@ -188,6 +192,7 @@ def test_a_run_that_is_unplugged_loses_nothing_and_goes_on(case: Case, device: A
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_run_that_is_killed_goes_on_after_the_same_bytes(case: Case, device: Any, tmp_path: Path) -> None:
     path, out = str(case.bed_at(tmp_path, device, CAMERA)), tmp_path / "run"
     words = [
