@@ -141,7 +141,7 @@ def test_own_tables_are_read_to_the_letter_and_need_no_mapping(tmp_path: Path) -
     assert not (tmp_path / "columns.toml").exists()
     assert read_drive(table).input_mm.tolist() == [1.0, 1.0]
     table.write_text("time_s,input_mm\n0,nan\n")
-    with pytest.raises(DataError, match="input_mm must be .* in line 2"):
+    with pytest.raises(DataError, match=r"input_mm must be .* in line 2"):
         read_drive(table)
 
 
