@@ -1,27 +1,28 @@
 """Types of the public names, which `__init__.py` imports when they are first asked for."""
 
-from calib.agreement import Agreement as Agreement
 from calib.board import Board as Board
 from calib.board import BoardCorners as BoardCorners
 from calib.board import find_corners as find_corners
 from calib.budget import Budget as Budget
 from calib.calibration import BareScale as BareScale
+from calib.calibration import StatedScale as StatedScale
 from calib.camera_response import CameraResponse as CameraResponse
 from calib.camera_response import standard_response as standard_response
-from calib.distances import Distances as Distances
 from calib.errors import CalibrationError as CalibrationError
+from calib.gauge_study import Agreement as Agreement
 from calib.gauge_study import GaugeStudy as GaugeStudy
 from calib.gauge_study import gauge_study as gauge_study
 from calib.known_widths import KnownSize as KnownSize
 from calib.known_widths import find_widths as find_widths
-from calib.lens import Lens as Lens
 from calib.limits import Limits as Limits
 from calib.line_scale import ScaleLines as ScaleLines
 from calib.line_scale import find_lines as find_lines
+from calib.measured_response import response_from_exposures as response_from_exposures
 from calib.measured_scale import Calibration as Calibration
+from calib.measured_scale import Distances as Distances
 from calib.measured_scale import Reference as Reference
-from calib.plane import Plane as Plane
-from calib.response_from_exposures import response_from_exposures as response_from_exposures
+from calib.projection import Lens as Lens
+from calib.projection import Plane as Plane
 from calib.scale_from_board import BoardFit as BoardFit
 from calib.scale_from_board import scale_from_board as scale_from_board
 from calib.scale_from_lines import LineScaleFit as LineScaleFit
@@ -30,4 +31,3 @@ from calib.scale_from_sizes import MeasuredSize as MeasuredSize
 from calib.scale_from_sizes import ScaleFit as ScaleFit
 from calib.scale_from_sizes import scale_from_pictures as scale_from_pictures
 from calib.scale_from_sizes import scale_from_sizes as scale_from_sizes
-from calib.stated_scale import StatedScale as StatedScale

@@ -1,19 +1,80 @@
-"""Uncertainty budget of a distance: all contributions, and their combination."""
+"""Uncertainty budget of a distance: one function for each source, and the only place that combines the sources.
+
+A source's function returns its standard uncertainty in millimetres, shape (n,), for n distances. The formula is
+gap_mm = (gap_px + p b) / s, where gap_px is the measured width, s the scale, b the edge bias, and p = +1 for a light
+gap and -1 for a dark gap (JCGM 100:2008, equation 13).
+"""
 
 from dataclasses import dataclass
+from math import cos, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calib import contributions
+from calib.limits import Limits, rectangular
 from calib.picture_shift import change_of_distance_px, lens_shift_px, tilt_shift_px
 from calib.short_repr import ShortRepr
 
 if TYPE_CHECKING:
     from calib.measured_scale import Calibration
 
+
 Floats = NDArray[np.float64]
+
+
+def edge_noise_mm(u_random_px: Floats, px_per_mm: float) -> Floats:
+    """Contribution of the noise of the two edges, the only contribution that differs from frame to frame."""
+    return np.asarray(u_random_px / px_per_mm)
+
+
+def estimator_mm(limits: Limits, px_per_mm: float, count: int) -> Floats:
+    """Contribution of the edge fit's phase error, for two independent edges."""
+    return np.full(count, sqrt(2.0) * rectangular(limits.estimator_px) / px_per_mm)
+
+
+def scale_and_bias_mm(value_mm: Floats, polarity: Floats, px_per_mm: float, covariance: Floats) -> Floats:
+    """Contribution of one cause that changes scale and edge bias, from the covariance of (px_per_mm, edge_bias_px).
+
+    The function is called once for each cause: the reference's size, the reference's edges, and the edge bias if no
+    reference determines it.
+    """
+    variance = (
+        covariance[1, 1] + value_mm**2 * covariance[0, 0] - 2.0 * polarity * value_mm * covariance[0, 1]
+    ) / px_per_mm**2
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+
+def plane_mm(value_mm: Floats, limits: Limits) -> Floats:
+    """Contribution of a plane that is not at the distance Z of the reference from the camera: dg / g = dz / Z."""
+    return np.asarray(np.abs(value_mm) * rectangular(limits.plane_mm) / limits.camera_distance_mm)
+
+
+def foreshortening_mm(value_mm: Floats, limits: Limits) -> Floats:
+    """Contribution of oblique view: a distance is shortened by the factor cos(tilt)."""
+    return np.asarray(np.abs(value_mm) * rectangular(1.0 - cos(limits.tilt_rad)))
+
+
+def keystone_mm(change_mm_per_rad: Floats, limits: Limits) -> Floats:
+    """Contribution of the perspective of a tilted plane; `change_mm_per_rad` has shape (2, n), one row per axis."""
+    return np.asarray(np.hypot(change_mm_per_rad[0], change_mm_per_rad[1]) * rectangular(limits.tilt_rad))
+
+
+def lens_mm(change_mm_per_unit: Floats, limits: Limits) -> Floats:
+    """Contribution of residual lens distortion, from the change per unit of distortion of distance minus scale."""
+    return np.asarray(np.abs(change_mm_per_unit) * rectangular(limits.lens_relative))
+
+
+def lens_fit_mm(change_px: Floats, covariance: Floats, px_per_mm: float) -> Floats:
+    """Contribution of a calibrated lens, from `change_px` per unit of each parameter, shape (p, n), and covariance."""
+    variance = np.einsum("in,ij,jn->n", change_px, covariance, change_px)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)) / px_per_mm)
+
+
+def temperature_mm(value_mm: Floats, limits: Limits) -> Floats:
+    """Contribution of thermal expansion of the reference relative to the temperature of its certificate."""
+    return np.asarray(np.abs(value_mm) * limits.expansion_per_k * rectangular(limits.temperature_k))
+
 
 # Step for the numerical derivative of a distance by a lens parameter, as a share of the parameter's standard
 # uncertainty.
@@ -96,36 +157,30 @@ def distance_budget(
     limits, s = scale.limits, scale.px_per_mm
     said = scale.how_stated
     lines = [
-        BudgetLine(
-            "edge noise", contributions.edge_noise_mm(u_random_px, s), "the fit of each frame's edges", shared=False
-        ),
-        BudgetLine(
-            "estimator", contributions.estimator_mm(limits, s, len(value_mm)), said("estimator_px", "px an edge")
-        ),
+        BudgetLine("edge noise", edge_noise_mm(u_random_px, s), "the fit of each frame's edges", shared=False),
+        BudgetLine("estimator", estimator_mm(limits, s, len(value_mm)), said("estimator_px", "px an edge")),
     ]
     for part in scale.parts:
-        u_mm = contributions.scale_and_bias_mm(value_mm, polarity, s, part.covariance)
+        u_mm = scale_and_bias_mm(value_mm, polarity, s, part.covariance)
         lines.append(BudgetLine(part.source, u_mm, part.supplied))
     plane_words = f"{said('plane_mm', 'mm')}, camera {said('camera_distance_mm', 'mm away').removeprefix('+-')}"
     lines += [
-        BudgetLine("distance from the calibrated plane", contributions.plane_mm(value_mm, limits), plane_words),
-        BudgetLine(
-            "tilt: foreshortening", contributions.foreshortening_mm(value_mm, limits), said("tilt_deg", "degrees")
-        ),
+        BudgetLine("distance from the calibrated plane", plane_mm(value_mm, limits), plane_words),
+        BudgetLine("tilt: foreshortening", foreshortening_mm(value_mm, limits), said("tilt_deg", "degrees")),
         BudgetLine(
             "tilt: perspective",
-            contributions.keystone_mm(_keystone_change(scale, flat_px, value_mm, polarity), limits),
+            keystone_mm(_keystone_change(scale, flat_px, value_mm, polarity), limits),
             said("tilt_deg", "degrees"),
         ),
         BudgetLine(
             "lens residual",
-            contributions.lens_mm(_lens_change(scale, flat_px, value_mm, polarity), limits),
+            lens_mm(_lens_change(scale, flat_px, value_mm, polarity), limits),
             said("lens_relative", "of the radius at the corner"),
         ),
-        BudgetLine("temperature", contributions.temperature_mm(value_mm, limits), said("temperature_k", "K")),
+        BudgetLine("temperature", temperature_mm(value_mm, limits), said("temperature_k", "K")),
     ]
     if scale.lens is not None:
-        u_mm = contributions.lens_fit_mm(_lens_fit_change_px(scale, points_px), scale.lens.covariance, s)
+        u_mm = lens_fit_mm(_lens_fit_change_px(scale, points_px), scale.lens.covariance, s)
         lines.append(BudgetLine("lens calibration", u_mm, "the fit of the board's corners"))
     return Budget(tuple(lines))
 

@@ -8,9 +8,9 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.edge_pairs import find_edge_pairs, has_square_end, straight_edges_in_view
 from calib.errors import CalibrationError
 from calib.parallel_edges import ParallelEdges
+from calib.straight_edges import find_edge_pairs, has_square_end, straight_edges_in_view
 
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
 

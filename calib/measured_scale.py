@@ -9,13 +9,31 @@ from numpy.typing import NDArray
 
 from calib.budget import Budget, distance_budget
 from calib.camera_response import CameraResponse
-from calib.distances import Distances
 from calib.errors import CalibrationError
-from calib.lens import Lens
 from calib.limits import Limits
 from calib.picture_shift import centre_px
-from calib.plane import Plane
+from calib.projection import Lens, Plane
 from calib.short_repr import ShortRepr
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Distances:
+    """Distances between pairs of points of a flat scene.
+
+    Parameters
+    ----------
+    value_mm : ndarray of float, shape (n,)
+        The distances.
+    u_mm : ndarray of float, shape (n,), or None
+        Standard uncertainties that include the scale's whole budget; None if the scale has no stated uncertainty.
+    u_random_mm : ndarray of float, shape (n,)
+        Random standard uncertainties, due to effects that vary from frame to frame.
+    """
+
+    value_mm: NDArray[np.float64]
+    u_mm: NDArray[np.float64] | None
+    u_random_mm: NDArray[np.float64]
+
 
 Floats = NDArray[np.float64]
 

@@ -8,9 +8,8 @@ import click
 import numpy as np
 
 from calib.camera_response import MeasuredResponse
+from calib.measured_response import response_from_exposures, response_from_wedge
 from calib.response_from_edges import response_from_edges
-from calib.response_from_exposures import response_from_exposures
-from calib.response_from_wedge import response_from_wedge
 from fingervision.cli._references import named_references, region_from
 from fingervision.domain.errors import UsageError
 from fingervision.interface.reference_pictures import read_pictures

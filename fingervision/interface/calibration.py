@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calib.agreement import Agreement
+from calib.gauge_study import Agreement
 from calib.known_widths import KnownSize, find_widths
 from calib.measured_scale import Calibration as MeasuredScale
 from fingervision.interface.argument_checks import path_of, region_of

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 
+from calib.calibration import is_stated
 from calib.measured_scale import Calibration
-from calib.stated_scale import is_stated
 from fingervision.domain.camera import CameraModel
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement

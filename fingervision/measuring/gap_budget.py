@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calib.budget import Budget, BudgetLine
-from calib.contributions import edge_noise_mm
+from calib.budget import Budget, BudgetLine, edge_noise_mm
 from calib.measured_scale import Calibration
 from fingervision.domain.gap import GapMeasurement
 from fingervision.measuring.bias_share import bias_shares

@@ -5,9 +5,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.calibration import BareScale
-from calib.distances import Distances
-from calib.stated_scale import StatedScale
+from calib.calibration import BareScale, StatedScale
+from calib.measured_scale import Distances
 from fingervision.domain.errors import DataError, UsageError
 
 # Permitted scales, from a picture of a street to a picture through a microscope; other values are typing errors, and

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.calibration import is_stated
 from calib.measured_scale import Calibration
-from calib.stated_scale import is_stated
 from fingervision import __version__
 from fingervision.domain.camera import CameraQuantity, Origin
 from fingervision.domain.errors import InputFileError

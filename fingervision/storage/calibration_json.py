@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
-from calib.lens import Lens
 from calib.limits import Limits
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
-from calib.plane import Plane
+from calib.projection import Lens, Plane
 from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.domain.field import Field
 from fingervision.storage.durable import replaced

@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from calib.calibration import BareScale
-from calib.lens import Lens
 from calib.limits import Limits
 from calib.measured_scale import Calibration, ScalePart
-from calib.plane import Plane
+from calib.projection import Lens, Plane
 from fingervision.domain.frame import Coding, Frame
 from fingervision.measuring.body_poses import BodyTracker
 from fingervision.measuring.drawing_placement import GivenPoint

@@ -9,11 +9,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.edge_pairs import find_edge_pairs
 from calib.known_widths import KnownSize, find_widths
 from calib.limits import Limits
 from calib.measured_scale import Reference
 from calib.scale_from_sizes import MeasuredSize, ScaleFit, scale_from_sizes
+from calib.straight_edges import find_edge_pairs
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.light import Light
 from fingervision.rendering.picture import render

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from calib.board import Board, find_corners
 from calib.errors import CalibrationError
-from calib.lens import Lens
 from calib.limits import Limits
+from calib.projection import Lens
 from calib.scale_from_board import scale_from_board
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.lens import RadialLens, Tilt

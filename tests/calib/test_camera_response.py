@@ -5,7 +5,7 @@ import pytest
 
 from calib.camera_response import CameraResponse, standard_response
 from calib.errors import CalibrationError
-from calib.response_from_exposures import response_from_exposures
+from calib.measured_response import response_from_exposures
 
 # Half of the light is these levels of 255 (IEC 61966-2-1; ITU-R BT.709-6): 187.5 and 179.8.
 HALF_LEVELS = {"linear": 127.5, "srgb": 187.52, "bt709": 179.84}

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from calib.agreement import Agreement
 from calib.errors import CalibrationError
-from calib.gauge_study import gauge_study, verdict
+from calib.gauge_study import Agreement, gauge_study, verdict
 
 # AIAG, Measurement Systems Analysis, 4th ed. 2010, figure III-B 15: three appraisers, ten parts, three trials.
 AIAG = np.array(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calib.edge_pairs import find_edge_pairs
+from calib.straight_edges import find_edge_pairs
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.light import Light
 from fingervision.rendering.picture import render

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from calib.errors import CalibrationError
+from calib.measured_response import response_from_wedge
 from calib.response_from_edges import response_from_edges
-from calib.response_from_wedge import response_from_wedge
 from fingervision.cli import cli
 
 Grey = NDArray[np.uint8]

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from calib.calibration import BareScale
-from calib.lens import Lens
 from calib.measured_scale import Calibration, ScalePart
-from calib.plane import Plane
+from calib.projection import Lens, Plane
 from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.gauges.quantities import Angle, Distance, Position, Shift
 from fingervision.gauges.recording import cells_of

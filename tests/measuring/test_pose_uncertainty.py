@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from calib.calibration import BareScale
-from calib.lens import Lens
 from calib.measured_scale import Calibration, ScalePart
-from calib.plane import Plane
+from calib.projection import Lens, Plane
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.gauges.plane_scale import PlaneScale

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import fingervision as fv
-from calib.calibration import BareScale
-from calib.stated_scale import STATED, StatedScale, is_stated
+from calib.calibration import STATED, BareScale, StatedScale, is_stated
 from fingervision.cli import main
 from fingervision.domain.errors import UsageError
 from fingervision.domain.frame import Frame

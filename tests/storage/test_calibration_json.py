@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from calib.camera_response import CameraResponse, standard_response
-from calib.lens import Lens
 from calib.limits import Limits
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
-from calib.plane import Plane
+from calib.projection import Lens, Plane
 from fingervision.domain.errors import DataError, InputFileError, OutputError
 from fingervision.storage.calibration_json import read_calibration, write_calibration
 

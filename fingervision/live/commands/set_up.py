@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from calib.calibration import is_stated
 from calib.measured_scale import Calibration
-from calib.stated_scale import is_stated
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import StateError, UsageError
 from fingervision.domain.gap import GapMeasurement

@@ -3,8 +3,8 @@
 import tempfile
 from pathlib import Path
 
+from calib.calibration import is_stated
 from calib.measured_scale import Calibration
-from calib.stated_scale import is_stated
 from fingervision.live.background import WAITED_FOR, BackgroundCommand
 from fingervision.live.choices import Choices
 from fingervision.storage.gaps_csv import GapRow, GapsReader
