@@ -1,6 +1,7 @@
 """Types of the public names, which `__init__.py` imports when they are first asked for."""
 
 from fingervision.domain.errors import ArgumentError as ArgumentError
+from fingervision.domain.errors import ArgumentTypeError as ArgumentTypeError
 from fingervision.domain.errors import DataError as DataError
 from fingervision.domain.errors import DeviceError as DeviceError
 from fingervision.domain.errors import FingervisionError as FingervisionError
@@ -21,6 +22,7 @@ from fingervision.domain.frame import LostFrame as LostFrame
 from fingervision.domain.parameter import Parameter as Parameter
 from fingervision.domain.status import Status as Status
 from fingervision.effects.effect_list import EffectList
+from fingervision.effects.trial import EffectAnswerError as EffectAnswerError
 from fingervision.frames.source import Description as Description
 from fingervision.frames.source import FrameSource as FrameSource
 from fingervision.interface.calibrate import calibrate as calibrate
@@ -39,6 +41,11 @@ from fingervision.interface.simulation import simulate as simulate
 from fingervision.interface.tables import read_model as read_model
 from fingervision.interface.tables import read_table as read_table
 from fingervision.plugins.faults import PluginError as PluginError
+from fingervision.plugins.faults import PluginImportError as PluginImportError
+from fingervision.plugins.faults import PluginNameError as PluginNameError
+from fingervision.plugins.faults import PluginShapeError as PluginShapeError
+from fingervision.plugins.faults import PluginTimeoutError as PluginTimeoutError
+from fingervision.plugins.faults import PluginVersionError as PluginVersionError
 from fingervision.tables.questions import OpenQuestionError as OpenQuestionError
 
 __version__: str

@@ -70,7 +70,6 @@ def command(
 ) -> None:
     """Identify the physical effect that a model lacks, by comparing the model with a measured table."""
     import json
-    import sys
 
     if reference is not None:
         if forced or without:
@@ -82,8 +81,7 @@ def command(
     from fingervision.storage.out_folder import new_out_folder
 
     out = results_folder(out, measured)
-    bar = click.progressbar(length=1000, label="diagnosing", file=sys.stderr, hidden=not sys.stderr.isatty())
-    with new_out_folder(out), bar:
+    with new_out_folder(out):
         done = diagnose(
             measured,
             model_path,
@@ -92,7 +90,7 @@ def command(
             seed=seed,
             kind=kind,
             columns=columns,
-            progress=lambda share: bar.update(max(0, int(1000 * share) - bar.pos)),
+            progress=True,
             call=running_command(),
         )
     document = done.write(out)

@@ -11,7 +11,6 @@ from fingervision.cli._where_to_measure import how_to_read_pictures, region_of, 
 from fingervision.domain.errors import UsageError
 
 if TYPE_CHECKING:
-    from fingervision.measuring.frame_loop import Progress
     from fingervision.measuring.measure import Measured
 
 EXAMPLES = """
@@ -162,8 +161,7 @@ def command(
 
         # Errors of the drawing or its points are reported before the recording is measured.
         follow = body_follower(mechanism, points)
-    with _Bar() as bar:
-        measured = measure_into(out, recording, task, rate_hz, bar)
+    measured = measure_into(out, recording, task, rate_hz, progress=True)
     _report(measured, as_json)
     if follow is not None:
         from fingervision.frames.source import Wish, open_source
@@ -179,35 +177,6 @@ def _frames(words: str | None) -> tuple[int, int] | None:
     if not (first.isascii() and first.isdigit() and last.isascii() and last.isdigit()):
         raise UsageError(f"--frames must be FIRST:LAST, two whole numbers such as 100:250, but is '{words}'.")
     return int(first), int(last)
-
-
-class _Bar:
-    """Progress bar with the remaining time, shown on a terminal only."""
-
-    def __init__(self) -> None:
-        from contextlib import ExitStack
-
-        self._stack = ExitStack()
-        self._bar: object = None
-        self._done = 0
-
-    def __enter__(self) -> "Progress":
-        return self._show
-
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
-
-    def _show(self, done: int, of: int | None) -> None:
-        import sys
-
-        if not (sys.stderr.isatty() and of):
-            return
-        if self._bar is None:
-            bar = click.progressbar(length=of, label="Measuring", file=sys.stderr, show_pos=True)
-            self._bar = self._stack.enter_context(bar)
-        assert hasattr(self._bar, "update")  # noqa: S101 - click's class has no public name
-        self._bar.update(done - self._done)
-        self._done = done
 
 
 def _report(measured: "Measured", as_json: bool) -> None:

@@ -7,7 +7,7 @@ version.
     ├── UsageError                   the request is wrong; exit code 2
     │   └── ArgumentError            one argument or option, also a ValueError
     │       ├── ArgumentTypeError    of the wrong kind, also a TypeError
-    │       └── UnknownNameError     an unknown name; the message gives the nearest known name
+    │       └── UnknownNameError     an unknown name; the message gives the nearest known name; also a KeyError
     ├── InputFileError               a file or folder cannot be found or read; also an OSError
     ├── DataError                    the content of a file, recording or array is not valid; also a ValueError
     ├── OutputError                  a result cannot be written; also an OSError
@@ -19,7 +19,7 @@ version.
     ├── ProcessError                 a worker process, cluster or server cannot be started or was lost
     ├── InstallationError            a part of fingervision itself is missing
     │   └── MissingLibraryError      an optional library is not installed; also an ImportError
-    └── PluginError                  a plug-in cannot be used; its classes are in `fingervision.plugins`
+    └── PluginError                  a plug-in cannot be used; its classes are in `fingervision.plugins.faults`
 """
 
 from collections.abc import Iterable
@@ -75,7 +75,7 @@ class ArgumentTypeError(ArgumentError, TypeError):
     """One argument is of a type that is not accepted."""
 
 
-class UnknownNameError(ArgumentError):
+class UnknownNameError(ArgumentError, KeyError):
     """A name is unknown; the message gives the nearest known name.
 
     Parameters
@@ -98,6 +98,10 @@ class UnknownNameError(ArgumentError):
         advice = f"did you mean {self.nearest}?" if self.nearest else listing
         super().__init__(argument, f"be {what}", f"is {name!r}", advice)
         self.args = (self.args[0].replace("?.", "?"),)
+
+    def __str__(self) -> str:
+        # That of a KeyError would be in quotation marks.
+        return str(self.args[0])
 
 
 class InputFileError(FingervisionError, OSError):

@@ -18,12 +18,24 @@ class EffectList(ModuleType):
     'after a reversal, the mechanism moves only once the play is taken up'
     >>> [effect.name for effect in fv.effects if effect.stage == "drive"][:2]
     ['drive_lag', 'input_offset']
-    >>> "backlash" in fv.effects
-    True
+    >>> "backlash" in fv.effects, fv.effects.backlash is fv.effects["backlash"]
+    (True, True)
     """
 
+    def __setattr__(self, name: str, value: object) -> None:
+        # Python adds the module of an effect as an attribute when it is imported; the effect itself stays.
+        super().__setattr__(name, getattr(value, "EFFECT", value) if isinstance(value, ModuleType) else value)
+
+    def __getattr__(self, name: str) -> Effect:
+        if name.startswith("__") or name not in (known := self._known()):
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}", name=name, obj=self)
+        return known[name]
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self._known()})
+
     def _known(self) -> dict[str, Effect]:
-        known: dict[str, Effect] = self.catalogue()
+        known: dict[str, Effect] = vars(self)["catalogue"]()
         return known
 
     def __iter__(self) -> Iterator[Effect]:
@@ -49,7 +61,7 @@ class EffectList(ModuleType):
         """
         known = self._known()
         if name not in known:
-            raise NoSuchEffectError(
+            raise UnknownNameError(
                 "name", str(name), known, "an effect of the catalogue", "fingervision.effects lists them"
             )
         return known[name]
@@ -66,11 +78,4 @@ class EffectList(ModuleType):
         return f"<table><tr><th>effect</th><th>stage</th><th>what happens</th></tr>{rows}</table>"
 
 
-class NoSuchEffectError(UnknownNameError, KeyError):
-    """The catalogue has no effect of that name."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
-
-
-__all__ = ["EffectList", "NoSuchEffectError"]
+__all__ = ["EffectList"]

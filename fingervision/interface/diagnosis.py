@@ -20,6 +20,7 @@ from fingervision.domain.report import DiagnosisReport, NamedEffect, Verdict
 from fingervision.interface.argument_checks import whole_number
 from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.own_effect import added
+from fingervision.interface.progress import shown
 from fingervision.interface.saved_results import cell_html, save_results
 from fingervision.interface.tables import effect_names, measured_given, model_given, own_base
 from fingervision.models.corrected import CorrectedModel
@@ -156,7 +157,7 @@ def diagnose(
     seed: int = 1,
     kind: str = "lumped",
     columns: "str | os.PathLike[str] | None" = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     call: str = CALL,
 ) -> Diagnosis:
     """Name the effect that a model lacks, from a measured table; write nothing.
@@ -178,8 +179,9 @@ def diagnose(
         Kind of model by which a gripper.toml is computed: stiffness_matrix, lumped or finite_element.
     columns : path or None
         A columns.toml, for tables of other programs.
-    progress : callable or None
-        Function called with the completed share of the work, from 0 to 1.
+    progress : callable, bool or None
+        Function called with the completed share of the work, from 0 to 1; True shows a progress bar on a terminal or in
+        a notebook.
     call : str
         Name of this call in the provenance of the results.
 
@@ -221,8 +223,9 @@ def diagnose(
         table = measured_given(measured, columns)
         given = model_given(model, kind, columns)
         made = provenance({**table.files("measured table", columns), **given.files("model", columns)}, call)
-        told: dict[str, Any] = {} if progress is None else {"progress": progress}
-        found = diagnose_table(table.value, given.value, seed=seed, forced=forced, without=without, **told)
+        with shown(progress, "Diagnosing") as show:
+            told: dict[str, Any] = {} if show is None else {"progress": show}
+            found = diagnose_table(table.value, given.value, seed=seed, forced=forced, without=without, **told)
     return Diagnosis(found, given.value, table.path, made, own)
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calib.calibration import BareScale
-from fingervision.domain.errors import ArgumentError
 from fingervision.domain.region import Region
 from fingervision.frames.source import FrameSource, Wish, open_source
 from fingervision.interface.argument_checks import region_of
@@ -13,6 +12,7 @@ from fingervision.interface.argument_names import speaks_python
 from fingervision.interface.frame_sources import recording_of
 from fingervision.interface.measurement import Measurement
 from fingervision.interface.measuring_task import measuring_task, range_of, scale_of
+from fingervision.interface.progress import shown
 from fingervision.measuring.frame_loop import Progress
 from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.measure import Measured
@@ -58,7 +58,7 @@ def measure(
     coding: str = "lossless",
     frames: int | tuple[int, int] | None = None,
     gauges: "str | os.PathLike[str] | Sequence[Gauge] | None" = None,
-    progress: Callable[[int, int | None], None] | None = None,
+    progress: Callable[[int, int | None], None] | bool | None = None,
 ) -> Measurement:
     """Measure the gap between two fingers in a picture, a recording or a camera's next frames; write nothing.
 
@@ -113,8 +113,9 @@ def measure(
         included.
     gauges : path, sequence of Gauge, or None
         Gauges to measure in addition to the gap; their values are in `gauge_rows`.
-    progress : callable or None
-        Called repeatedly with the number of measured frames and the number of frames that the source announces.
+    progress : callable, bool or None
+        Called repeatedly with the number of measured frames and the number of frames that the source announces; True
+        shows a progress bar on a terminal or in a notebook.
 
     Returns
     -------
@@ -161,16 +162,15 @@ def measure(
         frames=part,
         gauges=gauges,
     )
-    if progress is not None and not callable(progress):
-        raise ArgumentError("progress", "be a function of two numbers", f"is {progress!r}")
-    found = measure_in_memory(recording, task, progress)
+    with shown(progress, "Measuring", "frames") as show:
+        found = measure_in_memory(recording, task, show)
     if found.stopped:
         raise KeyboardInterrupt
     return Measurement(found, again)
 
 
 def measure_into(
-    folder: Path | None, recording: str, task: Task, rate_hz: float | None, on_progress: Progress | None
+    folder: Path | None, recording: str, task: Task, rate_hz: float | None, *, progress: Progress | bool | None = None
 ) -> Measured:
     """Measure a recording and write each row as soon as it is measured, so that any length fits into memory.
 
@@ -184,7 +184,7 @@ def measure_into(
         Settings of the measurement.
     rate_hz : float or None
         Images per second, if the images carry no times.
-    on_progress : callable or None
+    progress : callable, bool or None
         The same as the argument `progress` of `measure`.
 
     Raises
@@ -196,7 +196,8 @@ def measure_into(
     source = open_source(recording, Wish(rate_hz=rate_hz))
     out = folder or usual_folder(recording)
     refuse_other_recording(out, recording)
-    return measure_to_files(source, task, out, on_progress)
+    with shown(progress, "Measuring", "frames") as show:
+        return measure_to_files(source, task, out, show)
 
 
 def _own_scale(source: Any) -> float:

@@ -1,6 +1,6 @@
 """Error classes of plug-ins; each message names the plug-in and states what to do."""
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError
 
 
 class PluginError(FingervisionError):
@@ -29,7 +29,3 @@ class PluginVersionError(PluginError):
 
 class MisfitError(ValueError):
     """A plug-in does not meet its requirements; the message `must ..., but ...` is printed after the plug-in's name."""
-
-
-class PluginFileError(UsageError):
-    """The plug-in file does not exist, or defines no part."""

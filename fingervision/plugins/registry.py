@@ -19,10 +19,10 @@ from types import ModuleType
 from typing import Generic, TypeVar
 
 from fingervision import __version__
+from fingervision.domain.errors import UsageError
 from fingervision.plugins.entry import Entry, Refusal
 from fingervision.plugins.faults import (
     PluginError,
-    PluginFileError,
     PluginNameError,
     PluginShapeError,
     PluginVersionError,
@@ -95,22 +95,22 @@ def check_file(path: Path, what: str) -> Origin:
 
     Raises
     ------
-    PluginFileError
+    UsageError
         The file does not exist, or is not a Python file.
     PluginVersionError
         The inline metadata of the file require another version of fingervision.
     """
     origin = of_file(str(path))
     if not path.exists():
-        raise PluginFileError(f"There is no file {path}: {what} must come from a Python file that exists.")
+        raise UsageError(f"There is no file {path}: {what} must come from a Python file that exists.")
     if not path.is_file() or path.suffix.lower() != SUFFIX:
-        raise PluginFileError(
+        raise UsageError(
             f"{what.capitalize()} must come from a Python file (NAME.py), but {path} is not a Python file: name one."
         )
     try:
         source = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise PluginFileError(f"{path} must be a Python file in UTF-8, but could not be read ({error}).") from error
+        raise UsageError(f"{path} must be a Python file in UTF-8, but could not be read ({error}).") from error
     missing = unmet(stated_in(source))
     if missing is not None:
         raise PluginVersionError(needs(str(path), missing))
@@ -294,13 +294,13 @@ class Registry(Generic[T]):
 
         Raises
         ------
-        PluginError, PluginFileError
+        PluginError, UsageError
             The file cannot be read or imported, or defines no part of this kind.
         """
         origin = check_file(path, f"{self.noun}s")
         found = watched(f"{path}", origin, lambda: self._parts_of(load_file(path)))
         if not found:
-            raise PluginFileError(
+            raise UsageError(
                 f"{path} must hold at least one {self.noun}, but holds none: see `fingervision plugins --help`."
             )
         return found

@@ -70,3 +70,27 @@ def test_a_function_stands_before_the_module_of_its_name() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=ROOT)
     assert done.returncode == 0, done.stderr
+
+
+def test_every_error_that_can_be_raised_is_public() -> None:
+    bases: dict[str, set[str]] = {}
+    for path in (ROOT / "fingervision").rglob("*.py"):
+        # The page's server turns its own errors into messages of the page.
+        if "live" not in path.parts:
+            classes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ClassDef)]
+            bases |= {each.name: {base.id for base in each.bases if isinstance(base, ast.Name)} for each in classes}
+    errors = {"FingervisionError"}
+    while more := {name for name, own in bases.items() if own & errors} - errors:
+        errors |= more
+    caught_inside = {"BoardRefusalError"}
+    assert errors - caught_inside <= set(fingervision.__all__)
+
+
+def test_an_effect_is_one_thing_however_it_is_named() -> None:
+    program = (
+        "import fingervision as fv; import fingervision.effects.backlash; "
+        "assert fv.effects.backlash is fv.effects['backlash'] and 'backlash' in dir(fv.effects); "
+        "assert not hasattr(fv.effects, 'backlush')"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr

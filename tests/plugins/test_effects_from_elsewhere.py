@@ -8,10 +8,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
+from fingervision.domain.errors import UsageError
 from fingervision.effects import REGISTRY, catalogue, origin_of, register
 from fingervision.plugins.faults import (
     PluginError,
-    PluginFileError,
     PluginImportError,
     PluginNameError,
     PluginShapeError,
@@ -147,12 +147,12 @@ def test_a_plug_in_for_a_newer_version_is_refused_before_it_is_imported(
 @pytest.mark.parametrize(
     ("name", "text", "error"),
     [
-        ("none.py", None, PluginFileError),
-        ("mine.txt", "", PluginFileError),
-        ("empty.py", "", PluginFileError),
+        ("none.py", None, UsageError),
+        ("mine.txt", "", UsageError),
+        ("empty.py", "", UsageError),
         ("broken.py", "def act(:", PluginImportError),
         ("taken.py", effect_source("backlash"), PluginNameError),
-        ("latin.py", b"# \xe4", PluginFileError),
+        ("latin.py", b"# \xe4", UsageError),
     ],
 )
 def test_a_bad_file_ends_the_command_with_its_name(

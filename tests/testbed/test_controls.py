@@ -12,6 +12,7 @@ from time import monotonic, sleep
 import numpy as np
 import pytest
 
+from fingervision.domain.errors import StateError
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.samples_csv import SampleRow, read_samples
@@ -19,7 +20,6 @@ from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.camera import BedCamera, Shot
 from fingervision.testbed.run.controls import Controls
 from fingervision.testbed.run.recipe_run import run_recipe
-from fingervision.testbed.run.safety_monitor import StoppedError
 from tests.testbed.simulated_beds import SHORT, recipe_at, run, steps
 
 # Time limit for starting Python with its libraries on a loaded computer; no time is measured with it.
@@ -117,7 +117,7 @@ def test_the_time_of_a_simulation_stands_while_it_is_paused(tmp_path: Path, whol
 @pytest.mark.slow
 @pytest.mark.parametrize("at", [81, 91])
 def test_a_stopped_simulation_goes_on_to_the_same_end(tmp_path: Path, whole: bytes, at: int) -> None:
-    with pytest.raises(StoppedError):
+    with pytest.raises(StateError):
         pressed(tmp_path, SHORT, {at: "q"}, replays=True)
     run(tmp_path)
     assert (tmp_path / "run" / "samples.csv").read_bytes() == whole
@@ -126,7 +126,7 @@ def test_a_stopped_simulation_goes_on_to_the_same_end(tmp_path: Path, whole: byt
 def test_a_stop_ends_a_pause(tmp_path: Path) -> None:
     for replays in (True, False):
         with pytest.raises(
-            StoppedError, match=r"^The run was stopped, and the motor is at rest\. The same command continues the run"
+            StateError, match=r"^The run was stopped, and the motor is at rest\. The same command continues the run"
         ):
             pressed(tmp_path, SLOW, {UNDER_WAY: "p"}, replays=replays, on_say=Controls.stop)
 
@@ -146,7 +146,7 @@ def test_a_stop_before_a_motion_lets_nothing_move(tmp_path: Path, replays: bool)
     controls.toggle_pause()
     counted = replace(bed, actuator=Counting())  # type: ignore[arg-type]
     recipe = read_recipe(recipe_at(tmp_path, SLOW))
-    with pytest.raises(StoppedError):
+    with pytest.raises(StateError):
         run_recipe(recipe, counted, tmp_path / "run", controls=controls, say=lambda words: stop_at(words, controls))
     assert moves == []
 

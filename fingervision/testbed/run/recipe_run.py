@@ -74,7 +74,7 @@ class Runner:
 
         Raises
         ------
-        StoppedError
+        StateError
             The user ended the run.
         DeviceError, LimitError, StateError
             A limit was reached, an instrument failed, or no fingers are in view; the motor is then at rest.

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import sleep
 
-from fingervision.domain.errors import DeviceError, FingervisionError, LimitError
+from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.domain.frame import Frame
 from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import GapRow
@@ -20,10 +20,6 @@ FRAMES_TO_FIND_FINGERS = 3
 LOOK_EVERY_S = 0.05
 
 Say = Callable[[str], None]
-
-
-class StoppedError(FingervisionError):
-    """The user ended the run."""
 
 
 @dataclass(slots=True)
@@ -66,7 +62,7 @@ class Watch:
 
         Raises
         ------
-        StoppedError
+        StateError
             The user ended the run.
         DeviceError, LimitError
             The actuator has an alarm, or the force is beyond a limit.
@@ -89,7 +85,7 @@ class Watch:
 
         Raises
         ------
-        DeviceError, LimitError, StoppedError
+        DeviceError, LimitError, StateError
             As in `look`, or the gap is beyond its limit.
         """
         look = self.look()
@@ -124,7 +120,7 @@ class Watch:
 
     def _end_if_stopped(self) -> None:
         if self.controls.stopped:
-            raise StoppedError("The run was stopped, and the motor is at rest. The same command continues the run.")
+            raise StateError("The run was stopped, and the motor is at rest. The same command continues the run.")
 
     @property
     def _closes(self) -> bool:
