@@ -16,6 +16,7 @@ import cv2
 
 from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Frame, LostFrame, Pixels
+from fingervision.domain.status import Status
 from fingervision.frames.camera_settings import (
     EXPOSURE,
     FOCUS,
@@ -193,7 +194,8 @@ def found_cameras() -> list[tuple[str, str]]:
 class CameraFrames:
     """An open camera.
 
-    Grey levels are the camera's luma; time stamps are taken from the computer's clock on arrival of a frame.
+    Grey levels are the camera's luma. Time stamps are the driver's, where it gives any (V4L2: the beginning of the
+    exposure or of the transfer, by the computer's monotonic clock); else they are the times of arrival.
 
     Parameters
     ----------
@@ -203,7 +205,6 @@ class CameraFrames:
         Requested settings of the camera.
     """
 
-    has_own_clock = False
     template: av.VideoStream | None = None
 
     def __init__(self, name: str, wish: Wish) -> None:
@@ -226,6 +227,9 @@ class CameraFrames:
                 f"The camera {name} is open but gives no picture: another program may use it, or it does not offer "
                 "the requested format, size and rate; leave out --format, --size and --rate-hz."
             )
+        first_s = self._stamp_s()
+        self._capture.read()
+        self.has_own_clock = 0.0 < first_s < self._stamp_s()
         self._closed = Event()
         self._ranges = ranges(name) if self._capture.getBackendName() == V4L2 else {}
         self.description = self._described(wish, (pixels.shape[1], pixels.shape[0]))
@@ -237,7 +241,7 @@ class CameraFrames:
 
     def received(self) -> Iterator[Received]:
         """Yield the frames as they arrive, until the camera is closed or unplugged."""
-        failed = 0
+        failed, last_s = 0, 0.0
         try:
             for index in count():
                 read, pixels = self._capture.read()
@@ -250,7 +254,13 @@ class CameraFrames:
                     continue
                 failed = 0
                 arrived_s = monotonic()
-                yield Received(Frame(_luma(pixels), index, arrived_s, self.description.coding), arrived_s)
+                time_s = self._stamp_s() if self.has_own_clock else arrived_s
+                item: Frame | LostFrame = Frame(_luma(pixels), index, time_s, self.description.coding)
+                if time_s == last_s:
+                    words = "The frame has the same time as the previous frame."
+                    item = LostFrame(index, time_s, Status.DUPLICATE, words)
+                last_s = time_s
+                yield Received(item, arrived_s)
         finally:
             self._capture.release()
 
@@ -276,6 +286,10 @@ class CameraFrames:
         with _quiet():
             self._capture.set(*request_of(self._capture.getBackendName(), name, value))
         self.description = self._described(Wish(), (self.description.width_px, self.description.height_px))
+
+    def _stamp_s(self) -> float:
+        """The driver's time of the picture that was read last; 0 or less if it gives none."""
+        return 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC)
 
     def _ask(self, wish: Wish) -> None:
         """Request the given settings, and no automatic changes; a camera accepts only some of them."""

@@ -109,10 +109,12 @@ class Line:
     """
 
     def __init__(self, port: Port, words: Words) -> None:
-        self._port, self._words = port, words
+        self._port, self._words, self._settings = port, words, dict(words.settings)
         sleep(words.open_s)
         for each in words.opening:
-            self.do(each, {})
+            found = self.do(each, {})
+            if found is not None and "keep" in each.more:
+                self._settings[str(each.more["keep"])] = found[1]
 
     def do(self, exchange: Exchange, values: Mapping[str, str | float]) -> re.Match[str] | None:
         """Say the lines of an exchange, and await the reply to each; return the last reply.
@@ -179,7 +181,7 @@ class Line:
             self._port.close()
 
     def _all(self, values: Mapping[str, str | float]) -> dict[str, str | float]:
-        return {**self._words.settings, **values}
+        return {**self._settings, **values}
 
     def _reply(self, exchange: Exchange, said: str) -> re.Match[str]:
         until_s, others = monotonic() + exchange.within_s, []

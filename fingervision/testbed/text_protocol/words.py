@@ -29,6 +29,7 @@ ACTIONS: Mapping[str, tuple[str, ...]] = {
     "value": (*SAID, "scale"),
 }
 """Tables of a file of words, with their keys; `[[open]]` may be repeated, and `[settings]` has keys of its own."""
+SCALES = ("per_mm", "speed_per_mm_s")
 NAME = re.compile(r"\{(\w+)\}")
 ANSWER_S = 1.0
 
@@ -143,7 +144,7 @@ def words_of(section: Section, folder: Path, needed: tuple[str, ...]) -> Words:
         refusal=_pattern(top, "refusal", {}) if "refusal" in top.values else None,
         actions={each: _exchange(top, top.table(each), settings, keys) for each, keys in ACTIONS.items()
                  if each in top.values},
-        opening=tuple(_exchange(top, each, settings, (*SAID, "must")) for each in top.tables("open")),
+        opening=tuple(_exchange(top, each, settings, (*SAID, "must", "keep")) for each in top.tables("open")),
         settings=settings,
     )  # fmt: skip
 
@@ -176,7 +177,7 @@ def _exchange(top: Section, table: Section, settings: Mapping[str, Any], keys: t
             )
     if "moving" in keys and "moving_bits" not in table.values:
         _pattern(table, "moving", settings)
-    for key in ("per_mm", "speed_per_mm_s"):
+    for key in (*SCALES, "keep"):
         if isinstance(table.values.get(key), str):
             table.word(key, of=tuple(settings))
         elif key in table.values:
@@ -187,7 +188,7 @@ def _exchange(top: Section, table: Section, settings: Mapping[str, Any], keys: t
         reply=_pattern(table, "reply", settings) if "reply" in table.values else None,
         done=_pattern(table, "done", settings) if "done" in table.values else None,
         within_s=table.number("answer_s", top.number("answer_s", ANSWER_S, above=0.0), above=0.0),
-        more={key: settings.get(value, value) if isinstance(value, str) else value
+        more={key: settings.get(value, value) if key in SCALES else value
               for key, value in table.values.items() if key not in SAID},
     )  # fmt: skip
 

@@ -1,5 +1,6 @@
 """Controllers of stages in the network, written from their makers' protocols and apart from the kinds of stages."""
 
+import random
 import re
 import socket
 import struct
@@ -7,6 +8,13 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from time import monotonic, sleep
+
+
+class Time:
+    """The time of all emulators: the computer's, or that of a test bed whose time is virtual."""
+
+    now_s: Callable[[], float] = staticmethod(monotonic)
+
 
 # GRBL and Marlin state their position in steps of a motor.
 STEPS_PER_MM = 8000.0
@@ -19,16 +27,16 @@ class Plant:
         self._lock = threading.Lock()
         self._from = self._to = self._speed = self._began_s = 0.0
         self.speed = 1.0
-        self.lost_mm = 0.0
+        self.lost_mm = self.strays_mm = 0.0
         self.homed = self.homing = False
 
     def at(self) -> float:
         with self._lock:
-            return self._at()
+            return self._at() + random.uniform(-self.strays_mm, self.strays_mm)
 
     def _at(self) -> float:
         way = self._to - self._from
-        done = min(abs(way), self._speed * (monotonic() - self._began_s))
+        done = min(abs(way), self._speed * (Time.now_s() - self._began_s))
         return self._from + (done if way > 0 else -done)
 
     @property
@@ -37,12 +45,12 @@ class Plant:
 
     @property
     def moves(self) -> bool:
-        return monotonic() < self._began_s + abs(self._to - self._from) / max(self._speed, 1e-9)
+        return Time.now_s() < self._began_s + abs(self._to - self._from) / max(self._speed, 1e-9)
 
     def go(self, to: float, speed: float | None = None) -> None:
         with self._lock:
             self._from, self._to = self._at(), to + self.lost_mm
-            self._speed, self._began_s = speed or self.speed, monotonic()
+            self._speed, self._began_s = speed or self.speed, Time.now_s()
 
     def halt(self) -> None:
         with self._lock:
@@ -128,9 +136,14 @@ class Emulator:
         raise NotImplementedError
 
     def later(self, seconds: float, act: Callable[[], None]) -> None:
-        timer = threading.Timer(seconds, act)
-        timer.daemon = True
-        timer.start()
+        until_s = Time.now_s() + seconds
+
+        def wait() -> None:
+            while Time.now_s() < until_s:
+                sleep(0.001)
+            act()
+
+        threading.Thread(target=wait, daemon=True).start()
 
 
 class Grbl(Emulator):
@@ -296,6 +309,50 @@ class NewportEsp(Emulator):
             case _:
                 self.error = "6, 4523, COMMAND DOES NOT EXIST"
         return []
+
+
+class Zaber(Emulator):
+    """Zaber's ASCII protocol: microsteps, replies with the message's number, and with a checksum if it was sent one."""
+
+    PER_MM, SPEED_UNIT = 10_000.0, 1.6384
+    maxspeed = 32_768
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.plant.homed = True
+
+    def answer(self, line: str) -> list[str]:
+        message, _, checksum = line.strip().removeprefix("/").partition(":")
+        words = message.split()
+        numbers = [int(word) for word in words[:3] if word.isdigit()]
+        flag, data = self.do(words[len(numbers) :])
+        number = f" {numbers[2]:02d}" if len(numbers) > 2 else ""
+        device, axis = (*numbers, 0, 0)[:2]
+        state = "BUSY" if self.plant.moves else "IDLE"
+        reply = f"{device:02d} {axis}{number} {flag} {state} -- {data}"
+        return [f"@{reply}" + (f":{-sum(reply.encode()) & 0xFF:02X}" if checksum else "")]
+
+    def do(self, words: list[str]) -> tuple[str, str]:
+        plant = self.plant
+        match words:
+            case ["get", "maxspeed"]:
+                return "OK", str(self.maxspeed)
+            case ["get", "pos"]:
+                return "OK", str(round(plant.at() * self.PER_MM))
+            case ["set", "maxspeed", speed]:
+                self.maxspeed = int(speed)
+            case ["move", "abs", _] if not plant.homed:
+                return "RJ", "NOREF"
+            case ["move", "abs", to]:
+                plant.go(float(to) / self.PER_MM, self.maxspeed / self.SPEED_UNIT / self.PER_MM)
+            case ["home"]:
+                plant.homed = True
+                plant.go(0.0, 5.0)
+            case ["stop"]:
+                plant.halt()
+            case [_, *_]:
+                return "RJ", "BADCOMMAND"
+        return "OK", "0"
 
 
 class Conex(Emulator):

@@ -3,37 +3,45 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from tests.testbed.stages import emulators
 from tests.testbed.stages.motor_record import MotorRecordServer
 
 LIMITS = "lower_mm = -2\nupper_mm = 8\nspeed_mm_s = 5\naccuracy_mm = 0.002\n"
-CAMERA = """
+CAMERA = f"""
 [camera]
-kind = "simulated"
+kind = "{Path(__file__).with_name("still_camera.py").as_posix()}"
 rate_hz = 100.0
 width_px = 320
 height_px = 120
 px_per_mm = 17.0
 [gripper]
+file = "gripper.csv"
 [scale]
 px_per_mm = 17.0
 """
+GRIPPER = "input_mm,gap_mm\n-2,0.5\n8,5.5\n"
 
 
 @dataclass(frozen=True)
 class Case:
-    """A kind of stage; the emulator has `plant`, `port`, `plug`, `unplug`, `close`, and maybe `nonsense`, `silent`."""
+    """A kind of stage; the emulator has `plant`, `port`, `plug`, `unplug`, `close`, and maybe `nonsense`, `silent`.
+
+    `virtual`: it follows the clock of the test bed; otherwise it moves in real time.
+    """
 
     make: Callable[[], Any]
     lines: str
     library: str = ""
     settling_s: float = 0.2
+    virtual: bool = True
 
     def bed_at(self, folder: Path, emulator: Any, camera: str = "") -> Path:
         path = folder / "bed.toml"
         (folder / "demo.cfg").write_text(DEMO, encoding="utf-8")
+        (folder / "gripper.csv").write_text(GRIPPER, encoding="utf-8")
         actuator = self.lines.replace("PORT", emulator.port)
         path.write_text(
             f"schema = 1\n[actuator]\n{actuator}\n{LIMITS}settling_s = {self.settling_s}\n"
@@ -65,6 +73,17 @@ class Demo(Library):
         self.port = mm_test_adapters.device_adapter_path()
 
 
+class VirtualController(Library):
+    """The virtual controller of Standa's library, which keeps its state in a file."""
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory()
+        self.port = f"xi-emu:///{self._folder.name}/controller.bin"
+
+    def close(self) -> None:
+        self._folder.cleanup()
+
+
 MICROMANAGER = 'kind = "micromanager"\nfolder = "PORT"\nconfiguration = "demo.cfg"\n'
 DEMO = """
 Device,Stage,NotificationTester,NTAsyncStage
@@ -82,17 +101,25 @@ CASES: dict[str, Case] = {
     "smaract_mcs": Case(emulators.SmarAct, text("smaract_mcs")),
     "newport_esp": Case(emulators.NewportEsp, text("newport_esp")),
     "esp300": Case(emulators.NewportEsp, 'kind = "esp300"\nport = "PORT"\naxis = 1\n'),
+    "zaber": Case(emulators.Zaber, 'kind = "zaber"\nport = "PORT"\nmicrostep_mm = 0.0001\n'),
     "kinesis": Case(
         emulators.Kinesis,
         f'kind = "kinesis"\nport = "PORT"\ncontroller = "dc_servo"\ncounts_per_mm = {emulators.COUNTS_PER_MM}\n',
     ),
+    "standa": Case(
+        VirtualController,
+        'kind = "standa"\ndevice = "PORT"\nstep_mm = 0.0025\nacceleration_mm_s2 = 200\n',
+        "libximc",
+        virtual=False,
+    ),
     # The simulated record moves in ticks of 50 ms, each a little late.
-    "epics_motor": Case(MotorRecordServer, 'kind = "epics_motor"\nrecord = "PORT"\n', "caproto", settling_s=0.8),
+    "epics_motor": Case(MotorRecordServer, 'kind = "epics_motor"\nrecord = "PORT"\n', "caproto", 0.8, virtual=False),
     "ophyd_epics": Case(
         MotorRecordServer,
         'kind = "ophyd"\ndevice = "ophyd:EpicsMotor"\narguments = ["PORT"]\nnamed = { name = "stage" }\n',
         "ophyd",
-        settling_s=0.8,
+        0.8,
+        virtual=False,
     ),
     "ophyd_ramp": Case(
         Library, 'kind = "ophyd"\ndevice = "ophyd.sim:SynAxis"\nnamed = { name = "stage" }\nspeed = ""\n', "ophyd"
@@ -102,12 +129,14 @@ CASES: dict[str, Case] = {
         Library,
         'kind = "ophyd"\ndevice = "ophyd_async.sim:SimMotor"\nnamed = { name = "stage", instant = false }\n',
         "ophyd_async",
-        settling_s=1.0,
+        1.0,
+        virtual=False,
     ),
-    "micromanager": Case(Demo, f'{MICROMANAGER}device = "Stage"\n', "mm_test_adapters"),
+    "micromanager": Case(Demo, f'{MICROMANAGER}device = "Stage"\n', "mm_test_adapters", virtual=False),
     "micromanager_xy": Case(
         Demo,
         f'{MICROMANAGER}device = "XY"\naxis = "y"\nspeed_property = "Velocity"\nspeed_per_mm_s = 1\n',
         "mm_test_adapters",
+        virtual=False,
     ),
 }

@@ -1,13 +1,13 @@
-"""Every kind of real stage: the contract, a recipe, a stop in motion, faults of the line, kill -9 and resumption."""
+"""Every kind of real stage: the contract, a recipe, a stop in motion, faults of the line, kill -9 and resumption.
+
+Where the emulator is ours, test bed and emulator share a virtual clock, so that these tests neither wait nor depend on
+the load of the computer. What others emulate moves in real time; those tests are slow ones.
+"""
 
 import json
-import os
-import signal
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,46 +15,54 @@ from typing import Any
 import pytest
 
 from fingervision.domain.errors import DeviceError, FingervisionError, LimitError
-from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.samples_csv import read_samples
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.clocks.clock import VirtualClock
+from fingervision.testbed.device_kinds import kinds
 from fingervision.testbed.manual import manual_control
-from fingervision.testbed.run.recipe_run import run_recipe
-from fingervision.testing import ActuatorContract, checks_of, run
+from fingervision.testing import ActuatorContract, checks_of
+from fingervision.testing import run as failures
+from tests.testbed.stages.emulators import Time
+from tests.testbed.stages.recipe_process import run, started
 from tests.testbed.stages.stage_cases import CAMERA, CASES, Case
 
 # pyserial does not close the socket of a `socket://` port whose other end has closed it.
-# The whole contract, and runs of 300 frames that are unplugged or killed, are marked long: with ten kinds they take
-# minutes, and have not been seen to pass for every kind yet.
 pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
 # The computer may be loaded by other tests.
 PATIENCE_S = 240.0
-# At least 300 frames, however slow the computer is: a triangle, and ten points with thirty frames each.
+# Two rows a motion and more at each point: 33 and more frames, and 330 and more.
 RECIPE = """
 schema = 1
-name = "three hundred frames"
 [[step]]
 kind = "triangle"
 from_mm = 0.0
-to_mm = 0.5
+to_mm = 0.03
 speed_mm_s = 1.0
 [[step]]
 kind = "staircase"
 from_mm = 0.0
 to_mm = 0.45
-steps = 9
+steps = {steps}
 dwell_s = 0.0
 speed_mm_s = 2.0
-frames = 30
+frames = {frames}
 """
+FEW, MANY = RECIPE.format(steps=2, frames=10), RECIPE.format(steps=9, frames=33)
 
 
-@pytest.fixture(params=sorted(CASES))
+def virtual_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the next test beds and the emulators share a virtual clock, from now on."""
+    clock = VirtualClock(begin_s=time.monotonic())
+    monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: clock)
+    monkeypatch.setattr(Time, "now_s", clock.now_s)
+
+
+@pytest.fixture(params=[pytest.param(name, marks=() if CASES[name].virtual else pytest.mark.slow) for name in CASES])
 def case(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Case:
     found = CASES[request.param]
-    if found.library and found.library.partition(".")[0] not in sys.modules:
+    if found.library:
         pytest.importorskip(found.library, reason=f"{found.library} is not installed")
     monkeypatch.setenv("OPHYD_CONTROL_LAYER", "caproto")
     # The emulators are ready at once, unlike a board that restarts when its port is opened.
@@ -70,7 +78,13 @@ def device(case: Case) -> Iterator[Any]:
 
 
 @pytest.fixture
-def bed(case: Case, device: Any, tmp_path: Path) -> Iterator[Bed]:
+def virtual(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    if case.virtual:
+        virtual_time(monkeypatch)
+
+
+@pytest.fixture
+def bed(case: Case, device: Any, virtual: None, tmp_path: Path) -> Iterator[Bed]:
     opened = open_bed(str(case.bed_at(tmp_path, device)))
     manual_control.home(opened)
     yield opened
@@ -82,36 +96,43 @@ def has_a_cable(device: Any) -> None:
         pytest.skip("this stage is in the program itself")
 
 
-def recipe_at(folder: Path) -> Path:
-    path = folder / "recipe.toml"
-    path.write_text(RECIPE, encoding="utf-8")
-    return path
+def test_every_kind_that_drives_a_motor_is_tested_here() -> None:
+    tested = {case.lines.split('"')[1] for case in CASES.values()}
+    # The simulated stage, the board and the hand screw have tests of their own.
+    assert {*kinds("actuator")} - tested == {"simulated", "board", "hand_screw"}
 
 
-@pytest.mark.slow
-@pytest.mark.long
-def test_the_stage_keeps_the_contract(case: Case, device: Any, tmp_path: Path) -> None:
+def test_the_stage_keeps_the_contract(case: Case, device: Any, virtual: None, tmp_path: Path) -> None:
     path = str(case.bed_at(tmp_path, device))
     first = open_bed(path)
     manual_control.home(first)
     first.close()
     assert "test_homing_ends_at_zero" in checks_of(ActuatorContract)
-    assert run(ActuatorContract, open_bed=lambda: open_bed(path)) == {}
+    assert failures(ActuatorContract, open_bed=lambda: open_bed(path)) == {}
 
 
 def test_a_stop_in_motion_stops_the_stage_while_it_is_asked(bed: Bed) -> None:
     bed.actuator.move(5.0, 2.0)
-    asking = threading.Thread(target=lambda: [bed.actuator.readings() for _ in range(100)])
+    stopped = threading.Event()
+
+    def ask() -> None:
+        while not stopped.is_set():
+            bed.actuator.readings()
+
+    asking = threading.Thread(target=ask)
     asking.start()
-    time.sleep(0.15)
+    for _ in range(15):
+        assert bed.actuator.busy
+        wait(bed, 0.01)
     bed.actuator.stop()
+    stopped.set()
     asking.join()
-    until_s = time.monotonic() + 1.0
-    while bed.actuator.busy and time.monotonic() < until_s:
-        time.sleep(0.01)
+    until_s = bed.clock.now_s() + 1.0
+    while bed.actuator.busy and bed.clock.now_s() < until_s:
+        wait(bed, 0.01)
     at_mm = bed.actuator.readings()[-1].value
     assert 0.0 < at_mm < 3.0
-    time.sleep(0.15)
+    wait(bed, 0.15)
     assert bed.actuator.readings()[-1].value == pytest.approx(at_mm, abs=0.002)
     assert bed.actuator.alarm is None
     bed.actuator.move(at_mm + 0.02, 1.0)  # the next motion is accepted
@@ -133,10 +154,12 @@ def test_an_unplugged_stage_is_a_sentence_and_works_when_it_is_back(
     bed.actuator.move(1.0, 1.0)
     device.unplug()
     with pytest.raises(DeviceError, match=r"must .*(cable|emergency stop)"):
-        _when(lambda: not bed.actuator.busy, lambda: None)
+        when(lambda: not bed.actuator.busy)
     with suppress(FingervisionError):
         bed.actuator.stop()  # says that the stage may still move
     bed.close()
+    with pytest.raises(FingervisionError, match=r"must .* but "):
+        open_bed(str(case.bed_at(tmp_path, device)))
     device.plug()
     again = open_bed(str(case.bed_at(tmp_path, device)))
     assert manual_control.home(again) == pytest.approx(0.0, abs=0.002)
@@ -144,14 +167,26 @@ def test_an_unplugged_stage_is_a_sentence_and_works_when_it_is_back(
 
 
 @pytest.mark.parametrize("fault", ["nonsense", "silent"])
-def test_nonsense_and_silence_are_sentences(device: Any, bed: Bed, fault: str) -> None:
+def test_nonsense_and_silence_are_sentences_and_leave_the_stage_at_rest(
+    case: Case, device: Any, bed: Bed, fault: str, tmp_path: Path
+) -> None:
     if not hasattr(device, fault):
         pytest.skip("what is emulated is not ours, and has no such fault")
+    bed.actuator.move(2.0, 1.0)
+    wait(bed, 0.1)
     setattr(device, fault, True)
     with pytest.raises(DeviceError, match=r"must .* but "):
         bed.actuator.readings()
+    bed.close()  # the stop needs no answer
+    wait(bed, 0.05)
+    assert not device.plant.moves
+    assert device.plant.at() < 1.0
+    with pytest.raises(FingervisionError, match=r"must .* but "):
+        open_bed(str(case.bed_at(tmp_path, device)))
     setattr(device, fault, False)
-    assert bed.actuator.readings()[-1].value == pytest.approx(0.0, abs=0.002)
+    again = open_bed(str(case.bed_at(tmp_path, device)))
+    assert manual_control.home(again) == pytest.approx(0.0, abs=0.002)
+    again.close()
 
 
 def test_lost_steps_are_an_alarm_until_the_stage_is_homed(device: Any, bed: Bed) -> None:
@@ -167,68 +202,68 @@ def test_lost_steps_are_an_alarm_until_the_stage_is_homed(device: Any, bed: Bed)
     assert bed.actuator.alarm is None
 
 
-@pytest.mark.slow
-@pytest.mark.long
-def test_a_run_that_is_unplugged_loses_nothing_and_goes_on(case: Case, device: Any, tmp_path: Path) -> None:
+def test_a_recipe_loses_nothing_when_the_cable_is_pulled(
+    case: Case, device: Any, virtual: None, tmp_path: Path
+) -> None:
     has_a_cable(device)
-    path, out = str(case.bed_at(tmp_path, device, CAMERA)), tmp_path / "run"
-    recipe = read_recipe(recipe_at(tmp_path))
-    bed = open_bed(path)
-    pulled = threading.Thread(target=lambda: _when(lambda: frames_in(out / "video.mp4") > 30, device.unplug))
-    pulled.start()
+    (tmp_path / "recipe.toml").write_text(FEW, encoding="utf-8")
+    path, out = case.bed_at(tmp_path, device, CAMERA), tmp_path / "run"
+    unplugged_and_back(device, path, out, after=12)
+    assert_complete(out, at_least=33)
+
+
+@pytest.mark.slow
+def test_three_hundred_frames_through_kill_9_and_a_pulled_cable(
+    case: Case, device: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "recipe.toml").write_text(MANY, encoding="utf-8")
+    path, out = case.bed_at(tmp_path, device, CAMERA), tmp_path / "run"
+    process = started(tmp_path / "recipe.toml", path, out)
+    when(lambda: frames_in(out / "video.mp4") > 30 or process.exitcode is not None)
+    assert process.exitcode is None
+    process.kill()
+    process.join()
+    before, in_video = (out / "samples.csv").read_bytes(), frames_in(out / "video.mp4")
+    rows = len(read_samples(out / "samples.csv"))
+    assert in_video - rows <= 100  # a second
+    if case.virtual:
+        virtual_time(monkeypatch)
+    if hasattr(device, "unplug"):
+        resumed_after = unplugged_and_back(device, path, out, after=100)
+        assert resumed_after >= 100
+    else:
+        assert run(tmp_path / "recipe.toml", path, out).resumed_after == min(rows, in_video)
+    whole = before[: before.rfind(b"\n") + 1].splitlines(keepends=True)[: min(rows, in_video) + 1]
+    assert (out / "samples.csv").read_bytes().startswith(b"".join(whole))
+    assert_complete(out, at_least=330)
+
+
+def unplugged_and_back(device: Any, path: Path, out: Path, after: int) -> int:
+    """Run the recipe beside a test bed, pull its cable after some rows, plug it in, and go on after the same bytes."""
+    recipe = path.parent / "recipe.toml"
     with pytest.raises(FingervisionError, match=r"cable|emergency stop"):
-        run_recipe(recipe, bed, out)
-    bed.close()
-    pulled.join()
+        run(recipe, path, out, lambda row: device.unplug() if row == after else None)
     before, rows = (out / "samples.csv").read_bytes(), read_samples(out / "samples.csv")
     assert len(rows) == frames_in(out / "video.mp4")
     device.plug()
-    bed = open_bed(path)
-    done = run_recipe(recipe, bed, out)
-    bed.close()
-    assert done.resumed_after == len(rows)
+    assert run(recipe, path, out).resumed_after == len(rows)
     assert (out / "samples.csv").read_bytes().startswith(before)
-    assert json.loads((out / "run.json").read_text())["complete"]
+    return len(rows)
 
 
-@pytest.mark.slow
-@pytest.mark.long
-def test_a_run_that_is_killed_goes_on_after_the_same_bytes(case: Case, device: Any, tmp_path: Path) -> None:
-    path, out = str(case.bed_at(tmp_path, device, CAMERA)), tmp_path / "run"
-    words = [
-        sys.executable,
-        "-m",
-        "fingervision",
-        "bed",
-        "run",
-        str(recipe_at(tmp_path)),
-        "--bed",
-        path,
-        "--out",
-        str(out),
-    ]
-    process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _when(lambda: frames_in(out / "video.mp4") > 30 or process.poll() is not None, lambda: None)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    before, rows = (out / "samples.csv").read_bytes(), read_samples(out / "samples.csv")
-    in_video = frames_in(out / "video.mp4")
-    assert in_video - len(rows) <= 100  # a second
-    bed = open_bed(path)
-    done = run_recipe(read_recipe(tmp_path / "recipe.toml"), bed, out)
-    bed.close()
-    assert done.resumed_after == min(len(rows), in_video)
-    whole = before[: before.rfind(b"\n") + 1].splitlines(keepends=True)[: done.resumed_after + 1]
-    assert (out / "samples.csv").read_bytes().startswith(b"".join(whole))
+def assert_complete(out: Path, at_least: int) -> None:
     rows = read_samples(out / "samples.csv")
-    assert len(rows) == frames_in(out / "video.mp4") >= 300
-    at_mm = [row.input_mm for row in rows if row.input_mm is not None]
-    assert max(at_mm) == pytest.approx(0.5, abs=0.005)
+    assert len(rows) == frames_in(out / "video.mp4") >= at_least
+    assert [row.frame for row in rows] == list(range(len(rows)))
+    assert max(row.input_mm for row in rows if row.input_mm is not None) == pytest.approx(0.45, abs=0.005)
     assert json.loads((out / "run.json").read_text())["complete"]
 
 
-def _when(ready: Any, act: Any) -> None:
+def wait(bed: Bed, seconds: float) -> None:
+    bed.clock.wait_until(bed.clock.now_s() + seconds)
+
+
+def when(ready: Callable[[], bool]) -> None:
     until_s = time.monotonic() + PATIENCE_S
     while not ready() and time.monotonic() < until_s:
         time.sleep(0.02)
-    act()

@@ -14,7 +14,7 @@ from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testing import ForceSensorContract, run
 from tests.testbed.stages.emulators import Emulator, Meter, PrintedNumbers
-from tests.testbed.stages.stage_cases import CAMERA
+from tests.testbed.stages.stage_cases import CAMERA, GRIPPER
 
 pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
 RECIPE = 'schema = 1\n[[step]]\nkind = "hold"\nat_mm = 0.0\nseconds = 0.6\n'
@@ -37,6 +37,7 @@ def bed_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], B
 
     def opened(lines: str) -> Bed:
         path = tmp_path / "bed.toml"
+        (tmp_path / "gripper.csv").write_text(GRIPPER, encoding="utf-8")
         path.write_text(f'schema = 1\n[actuator]\nkind = "simulated"\n{lines}{CAMERA}', encoding="utf-8")
         return open_bed(str(path))
 
