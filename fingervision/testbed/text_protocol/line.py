@@ -204,7 +204,8 @@ class Line:
         )
 
     def _heard(self, within_s: float) -> str:
-        line = self._port.line(self._words.answer_end.encode("latin-1"), within_s).decode("latin-1").strip()
+        end = self._words.answer_end
+        line = self._port.line(end.encode("latin-1"), within_s).decode("latin-1").removesuffix(end).strip()
         refusal = self._words.refusal
         if line and refusal is not None and (found := refusal.search(line)):
             raise RefusedError("refused", found[1] if refusal.groups and found[1] else line)

@@ -391,6 +391,8 @@ class Conex(Emulator):
 class Invented(Emulator):
     """The invented controller of the manual's page on stages: micrometres, every command is answered."""
 
+    answer_end = b"\n"
+
     def answer(self, line: str) -> list[str]:
         plant, words = self.plant, line.strip().split()
         match words:

@@ -47,12 +47,21 @@ say = "{axis}ST"
 """
 
 
+class Semicolons(Invented):
+    """Answers end with a character that is no white space."""
+
+    answer_end = b";"
+
+
 def bed_with(words: str, device: Emulator, folder: Path) -> Path:
     (folder / "own.toml").write_text(words, encoding="utf-8")
     return Case(Invented, text("./own.toml")).bed_at(folder, device)
 
 
-@pytest.mark.parametrize(("words", "make"), [(EXAMPLE, Invented), (CONEX, Conex)])
+@pytest.mark.parametrize(
+    ("words", "make"),
+    [(EXAMPLE, Invented), (EXAMPLE.replace('answer_end = "\\n"', 'answer_end = ";"'), Semicolons), (CONEX, Conex)],
+)
 def test_a_file_of_ones_own_drives_its_controller(words: str, make: type[Emulator], tmp_path: Path) -> None:
     device = make()
     bed = open_bed(str(bed_with(words, device, tmp_path)))
