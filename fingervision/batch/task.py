@@ -1,10 +1,14 @@
 """Task and outcome of a worker, as sent between processes and computers."""
 
+import errno
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.batch.digest import Digest
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+"""Errors of the operating system that mean a full disk."""
 
 
 @dataclass(frozen=True, slots=True)

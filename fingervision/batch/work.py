@@ -1,6 +1,5 @@
 """Process one input in a worker process; processing the same input twice is harmless."""
 
-import errno
 import os
 import shutil
 from dataclasses import replace
@@ -18,9 +17,7 @@ from fingervision.batch.result_folder import (
     states_of_tables,
     write_record,
 )
-from fingervision.batch.task import Outcome, Perform, Task, failure
-
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+from fingervision.batch.task import NO_ROOM, Outcome, Perform, Task, failure
 
 
 def work(task: Task, perform: Perform) -> Outcome:

@@ -15,14 +15,17 @@ from typing import Any, NoReturn
 import click
 
 from fingervision import __version__
+from fingervision.cli._command import Group
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
 
 TRACEBACK = "FINGERVISION_TRACEBACK"
 """Environment variable with which an unexpected error prints its traceback."""
+COMMONEST = ("measure", "inspect", "calibrate", "compare", "diagnose", "model", "live", "batch")
+"""Commands that stand first in the list, in the order in which a newcomer meets them."""
 OUTPUT_ERRORS = (errno.ENOSPC, errno.EIO, errno.EPIPE)
 
 
-class Commands(click.Group):
+class Commands(Group):
     """Command group in which every module of this package without a leading underscore is a command.
 
     The module's name is that of the command, and its variable `command` is the command itself. The module imports no
@@ -40,8 +43,9 @@ class Commands(click.Group):
         return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the subcommands, sorted."""
-        return sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_"))
+        """Names of the subcommands: the commonest, then the others, sorted."""
+        found = {module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")}
+        return [*(name for name in COMMONEST if name in found), *sorted(found - set(COMMONEST))]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import only the module of the requested command."""

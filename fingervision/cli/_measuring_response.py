@@ -10,7 +10,7 @@ import numpy as np
 from calib.camera_response import MeasuredResponse
 from calib.measured_response import response_from_exposures, response_from_wedge
 from calib.response_from_edges import response_from_edges
-from fingervision.cli._references import named_references, region_from
+from fingervision.cli._options import named_references, region_from
 from fingervision.domain.errors import UsageError
 from fingervision.interface.reference_pictures import read_pictures
 from fingervision.storage.response_csv import write_response
@@ -54,9 +54,9 @@ def measure_response(
             found = response_from_wedge(pictures[0], _densities(densities), top, out.name, region_from(roi))
     else:
         named = named_references(items, "bar", "EXPOSURE with a positive exposure", "e20.png=2")
-        pictures = [grey for _, grey in read_pictures([path for _, path, _ in named])]
+        pictures = [grey for _, grey in read_pictures([path for path, *_ in named])]
         top = max(top_level(grey) for grey in pictures)
-        found = response_from_exposures(pictures, [value for *_, value in named], top, out.name)
+        found = response_from_exposures(pictures, [value for _, value, _ in named], top, out.name)
     write_response(found.response, out)
     _say(found, top, out, as_json)
 

@@ -1,13 +1,18 @@
 """`fingervision batch`: measure or diagnose many inputs, on all cores of this computer or on a Dask cluster."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from copy import copy
+from io import StringIO
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from fingervision.batch.task import NO_ROOM, Ended
 from fingervision.cli import cli
+from fingervision.cli._command import FILE, FOLDER, OUTPUT, Command, Group, Option
 from fingervision.domain.errors import ExitCode, FingervisionError, InputFileError, StateError, UsageError
 
 if TYPE_CHECKING:
@@ -45,12 +50,16 @@ Files written to --out:
 Exit codes: 0 all done; 1 no input could be processed, or the batch was stopped; 2 wrong usage; 3 done, but some inputs
 were damaged or could not be processed: each is listed with its message.
 """
+# The streams belong to the whole process; a Dask worker may have several threads.
+_ONE_AT_A_TIME = Lock()
 OWN = ("inputs", "list_file", "results", "out", "scheduler", "jobs", "as_json")
 BAD_SHOWN = 10
+BATCH = "Batch"
+"""Group of the help."""
 COMMANDS = ("measure", "diagnose")
 
 
-@click.group(epilog=EXAMPLES)
+@click.group("batch", cls=Group, epilog=EXAMPLES)
 def command() -> None:
     """Run one command on many inputs, with a result folder for each input and an overview of all results."""
 
@@ -92,41 +101,73 @@ def _batch_of(name: str) -> click.Command:
         }
         _run(name, options, given, **{"results": None, **{key: chosen[key] for key in OWN if key in chosen}})
 
-    results = [
-        click.Option(
-            ["--results"],
-            type=click.Path(path_type=Path),
-            help="Folder of `batch measure`, whose gaps of the list's recordings are diagnosed.",
-        )
-    ]
-    return click.Command(
+    def of_batch(*declared: str, group: str = BATCH, **settings: Any) -> Option:
+        return Option(declared, group=group, **settings)
+
+    results = of_batch(
+        "--results", type=FOLDER, help="Folder of `batch measure`, whose gaps of the list's recordings are diagnosed."
+    )
+    return Command(
         name,
         callback=callback,
         params=[
             click.Argument(["inputs"], nargs=-1, metavar="[INPUT...]"),
-            *options,
-            click.Option(
-                ["--list", "list_file"],
-                type=click.Path(path_type=Path),
-                help="CSV table with a row for each input, in place of INPUT.",
-            ),
-            *(results if name == "diagnose" else ()),
-            click.Option(
-                ["--scheduler"],
+            of_batch("--list", "list_file", type=FILE, help="CSV table with a row for each input, in place of INPUT."),
+            *([results] if name == "diagnose" else ()),
+            of_batch(
+                "--scheduler",
                 metavar="tcp://HOST:PORT",
                 help="Address of a Dask cluster whose workers process the inputs.",
             ),
-            click.Option(
-                ["--jobs"],
+            of_batch(
+                "--jobs",
                 type=click.IntRange(min=1),
                 help="Number of processes on this computer; default: one per core.",
             ),
-            click.Option(["--out"], type=click.Path(path_type=Path), required=True, help="Folder for all results."),
-            click.Option(["--json", "as_json"], is_flag=True, help="Print the result of every input as JSON."),
+            *options,
+            of_batch("-o", "--out", type=FOLDER, required=True, help="Folder for all results.", group=OUTPUT),
+            of_batch("--json", "as_json", is_flag=True, help="Print the result of every input as JSON.", group=OUTPUT),
         ],
         help=f"Run `fingervision {name}` on every INPUT. Inputs are paths, or patterns in quotes.",
         epilog=EXAMPLES,
     )
+
+
+def perform(name: str, arguments: tuple[str, ...]) -> Ended:
+    """Run a command in the same way as the command line does.
+
+    Parameters
+    ----------
+    name : str
+        The command's name.
+    arguments : tuple of str
+        Arguments and options as on the command line.
+    """
+    said = StringIO()
+    with _ONE_AT_A_TIME, redirect_stdout(StringIO()), redirect_stderr(said):
+        try:
+            cli.main([name, *arguments], prog_name="fingervision", standalone_mode=False)
+        except SystemExit as ended:
+            code = ended.code if isinstance(ended.code, int) else ExitCode.DONE
+            return Ended(int(code), said.getvalue().removeprefix("fingervision: ").strip(), finished=True)
+        except click.ClickException as error:
+            return Ended(error.exit_code, error.format_message(), finished=False)
+        except click.Abort:
+            return Ended(ExitCode.COULD_NOT, "The command was stopped before its end: call it again.", finished=False)
+        except FingervisionError as error:
+            return Ended(int(error.exit_code), str(error), finished=False, disk_full=_is_for_want_of_room(error))
+        except Exception as error:  # a defect of this program in one recording must not stop the others
+            words = f"A fault in fingervision ended the command ({type(error).__name__}: {error}): please report it."
+            return Ended(ExitCode.COULD_NOT, words, finished=False, disk_full=_is_for_want_of_room(error))
+    return Ended(ExitCode.DONE, "", finished=True)
+
+
+def _is_for_want_of_room(error: BaseException | None) -> bool:
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in NO_ROOM:
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _run(
@@ -147,7 +188,6 @@ def _run(
     from fingervision.batch import cluster
     from fingervision.batch.local_processes import LocalCrew, cores
     from fingervision.batch.run import Crew, Job, planned, run
-    from fingervision.cli._unattended import perform
 
     if scheduler is not None and jobs is not None:
         raise UsageError(

@@ -1,16 +1,21 @@
 """`fingervision calibrate`: scale in pixels per millimetre from a reference object, with an uncertainty budget."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from fingervision.cli._bench_limits import limit_options
-from fingervision.cli._calibrating import calibrate_on_board, calibrate_on_lines, calibrate_on_sizes, sentences
-from fingervision.cli._number import NUMBER
-from fingervision.cli._references import named_references, region_from
+from fingervision.cli._command import FILE, NUMBER, OUTPUT, Group, option, together
+from fingervision.cli._options import (
+    json_option,
+    named_references,
+    out_option,
+    region_from,
+    response_option,
+    roi_option,
+)
 from fingervision.domain.errors import DataError, UsageError
 
 BAR_EXAMPLES = """
@@ -60,9 +65,6 @@ Examples:
   fingervision calibrate repeat a/gaps.csv b/gaps.csv --by-input
 """
 
-Command = Callable[..., Any]
-
-
 GROUP_EXAMPLES = """
 \b
 Examples:
@@ -71,172 +73,230 @@ Examples:
 """
 
 
-@click.group("calibrate", epilog=GROUP_EXAMPLES)
+@click.group("calibrate", cls=Group, epilog=GROUP_EXAMPLES)
 def command() -> None:
     """Calibrate pixels to millimetres from a reference of known size."""
 
 
-def _output_options(command: Command) -> Command:
-    for option in reversed(
-        (
-            click.option("-o", "--out", default="calibration.json", type=click.Path(path_type=Path), show_default=True),
-            click.option("--certificate", default="", help="Name of the reference's certificate."),
-            click.option("--date", default="", help="Date of the certificate."),
-            click.option(
-                "--response",
-                default="auto",
-                show_default=True,
-                metavar="auto|linear|srgb|bt709|FILE",
-                help="Camera response (light for each grey level); auto: the pictures' own tag, else linear.",
-            ),
-            click.option(
-                "--camera",
-                multiple=True,
-                metavar="NAME=VALUE",
-                help="A camera setting to record in the calibration; repeatable.",
-            ),
-            click.option("--no-picture", is_flag=True, help="Write no calibration picture."),
-            click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
-        )
-    ):
-        command = option(command)
-    return command
+REFERENCE, SETUP = "Reference", "Limits of the set-up"
+"""Groups of the help."""
+LIMITS = (
+    ("--plane-mm", "plane_mm", 0.5, "Largest distance of the gripper from the plane of the reference, +- mm."),
+    (
+        "--camera-distance-mm",
+        "camera_distance_mm",
+        100.0,
+        "Distance of the camera from the plane of the reference, mm.",
+    ),
+    ("--tilt-deg", "tilt_deg", 2.0, "Largest tilt of the plane, +- degrees."),
+    (
+        "--lens-relative",
+        "lens_relative",
+        0.001,
+        "Largest residual lens distortion, +-, as a fraction of the distance from centre to corner.",
+    ),
+    (
+        "--edge-bias-px",
+        "edge_bias_px",
+        0.6,
+        "Largest edge bias (both edges together) if no reference determines it, +- px.",
+    ),
+    ("--estimator-px", "estimator_px", 0.02, "Largest sub-pixel phase bias of the fit of each edge, +- px."),
+    (
+        "--temperature-k",
+        "temperature_k",
+        2.0,
+        "Largest deviation of the reference's temperature from its certificate's, +- K.",
+    ),
+    ("--expansion-per-k", "expansion_per_k", 11.5e-6, "Thermal expansion of the reference (steel), 1/K."),
+)
+"""What the uncertainty budget needs and no picture shows: option, name and default in calib.limits.Limits (a test
+compares the defaults), description."""
+_limit_options = together(
+    *(
+        option(flag, name, type=NUMBER, group=SETUP, help=f"{words}  [default: {default:g}]")
+        for flag, name, default, words in LIMITS
+    )
+)
+_output_options = together(
+    option("--certificate", default="", group=REFERENCE, help="Name of the reference's certificate."),
+    option("--date", default="", group=REFERENCE, help="Date of the certificate."),
+    response_option("the pictures' own tag, else linear", SETUP),
+    option(
+        "--camera",
+        multiple=True,
+        metavar="NAME=VALUE",
+        group=SETUP,
+        help="A camera setting to record in the calibration; repeatable.",
+    ),
+    out_option("calibration.json", "File for the calibration.", FILE),
+    option("--no-figure", is_flag=True, former=("--no-picture",), group=OUTPUT, help="Write no calibration picture."),
+    json_option("Print the result as JSON."),
+)
+_size_options = together(
+    click.argument("items", nargs=-1, required=True, metavar="IMAGE=SIZE_MM..."),
+    option(
+        "--u-size-mm",
+        type=NUMBER,
+        default=0.001,
+        show_default=True,
+        group=REFERENCE,
+        help="Standard uncertainty of every size, mm.",
+    ),
+    roi_option("Use only this part of every picture."),
+)
+_board_options = together(
+    click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=FILE),
+    option("--square-mm", type=NUMBER, required=True, group=REFERENCE, help="Side of a square, mm."),
+    option(
+        "--u-square-mm",
+        type=NUMBER,
+        group=REFERENCE,
+        help="Standard uncertainty of a square's side, mm.  [default: 0.1 % of it]",
+    ),
+)
 
 
-def _size_options(command: Command) -> Command:
-    for option in reversed(
-        (
-            click.argument("items", nargs=-1, required=True, metavar="IMAGE=SIZE_MM..."),
-            click.option(
-                "--u-size-mm",
-                type=NUMBER,
-                default=0.001,
-                show_default=True,
-                help="Standard uncertainty of every size, mm.",
-            ),
-            click.option("--roi", metavar="X,Y,W,H", help="Use only this part of every picture."),
-        )
-    ):
-        command = option(command)
-    return command
+def _calibrate(
+    kind: str, pictures: Any, *, out: Path, camera: Sequence[str], no_figure: bool, as_json: bool, **options: Any
+) -> None:
+    """Call `fingervision.calibrate`, write its result and print it."""
+    from fingervision.interface.calibrate import calibrate
+    from fingervision.interface.calibration_report import as_json as for_programs
+    from fingervision.storage.calibration_json import refuse_foreign
+
+    refuse_foreign(out)
+    if "roi" in options:
+        options["roi"] = region_from(options["roi"])
+    made = calibrate(kind, pictures, camera=_settings(camera), **options)
+    made.save(out, pictures=not no_figure)
+    if as_json:
+        click.echo(json.dumps(for_programs(made.scale, {"out": str(out), **made.details})))
+    else:
+        click.echo(f"{made.report()}\n\nWritten: {out}")
+
+
+def _settings(camera: Sequence[str]) -> dict[str, str]:
+    settings = {}
+    for setting in camera:
+        name, equals, value = setting.partition("=")
+        if not (name and equals):
+            raise UsageError(f"--camera must be NAME=VALUE, but is {setting!r}.")
+        settings[name] = value
+    return settings
+
+
+def _squares(squares: str) -> tuple[int, int]:
+    try:
+        columns, rows = (int(part) for part in squares.lower().split("x"))
+    except ValueError:
+        raise UsageError(f"--squares must be two whole numbers such as 9x6, but is {squares!r}.") from None
+    return columns, rows
 
 
 @command.command("bar", epilog=BAR_EXAMPLES)
 @_size_options
-@limit_options
+@_limit_options
 @_output_options
-def bar(**options: Any) -> None:
+def bar(items: Sequence[str], **options: Any) -> None:
     """Calibrate on bars: objects with two parallel straight edges at a known distance.
 
     Each picture shows one object, in any direction; the object may extend beyond the picture. Objects of three
     different sizes determine scale and edge bias. Fewer sizes determine only the scale; the edge bias is then not
     corrected, and its limit enters the budget. To add slots, prefix an item: slot:ref3.png=3.000.
     """
-    calibrate_on_sizes("bar", **options)
+    _calibrate("bar", named_references(items, "bar"), **options)
 
 
 @command.command("slot", epilog=SLOT_EXAMPLES)
 @_size_options
-@limit_options
+@_limit_options
 @_output_options
-def slot(**options: Any) -> None:
+def slot(items: Sequence[str], **options: Any) -> None:
     """Calibrate on slots: openings between two parallel straight edges at a known distance.
 
     All other options are as for `bar`. To add bars, prefix an item: bar:ref5.png=5.000.
     """
-    calibrate_on_sizes("slot", **options)
-
-
-def _board_options(command: Command) -> Command:
-    for option in reversed(
-        (
-            click.argument("images", nargs=-1, required=True, metavar="IMAGE...", type=click.Path(path_type=Path)),
-            click.option("--square-mm", type=NUMBER, required=True, help="Side of a square, mm."),
-            click.option(
-                "--u-square-mm",
-                type=NUMBER,
-                default=None,
-                help="Standard uncertainty of a square's side, mm.  [default: 0.1 % of it]",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
+    _calibrate("slot", named_references(items, "slot"), **options)
 
 
 @command.command("chessboard", epilog=CHESSBOARD_EXAMPLES)
 @_board_options
-@click.option("--squares", required=True, metavar="9x6", help="Inner corners: 9x6 for a board of 10x7 squares.")
-@limit_options
+@option(
+    "--squares", required=True, metavar="9x6", group=REFERENCE, help="Inner corners: 9x6 for a board of 10x7 squares."
+)
+@_limit_options
 @_output_options
-def chessboard(**options: Any) -> None:
+def chessboard(images: Sequence[Path], squares: str, **options: Any) -> None:
     """Calibrate on a chessboard: lens and tilt from three pictures or more, only the plane from one picture.
 
     The first picture defines the plane in which distances are measured: put the board where the gripper moves. For the
     other pictures, tilt the board differently each time.
     """
-    calibrate_on_board("chessboard", **options)
+    _calibrate("chessboard", list(images), squares=_squares(squares), **options)
 
 
 @command.command("charuco", epilog=CHARUCO_EXAMPLES)
 @_board_options
-@click.option("--squares", required=True, metavar="8x6", help="Squares along x and y.")
-@click.option("--marker-mm", type=NUMBER, default=None, help="Side of a marker, mm.  [default: 0.75 of a square]")
-@limit_options
+@option("--squares", required=True, metavar="8x6", group=REFERENCE, help="Squares along x and y.")
+@option("--marker-mm", type=NUMBER, group=REFERENCE, help="Side of a marker, mm.  [default: 0.75 of a square]")
+@_limit_options
 @_output_options
-def charuco(**options: Any) -> None:
+def charuco(images: Sequence[Path], squares: str, **options: Any) -> None:
     """Calibrate on a ChArUco board, which may extend beyond the picture; its marker dictionary is recognised.
 
     All other options are as for `chessboard`, but --squares counts squares and not inner corners.
     """
-    calibrate_on_board("charuco", **options)
+    _calibrate("charuco", list(images), squares=_squares(squares), **options)
 
 
 @command.command("scale", epilog=SCALE_EXAMPLES)
-@click.argument("image", type=click.Path(path_type=Path))
-@click.option("--pitch-mm", type=NUMBER, required=True, help="Certified distance of neighbouring lines, mm.")
-@click.option(
+@click.argument("image", type=FILE)
+@option("--pitch-mm", type=NUMBER, required=True, group=REFERENCE, help="Certified distance of neighbouring lines, mm.")
+@option(
     "--u-line-mm",
     type=NUMBER,
+    group=REFERENCE,
     default=0.0003,
     show_default=True,
     help="Standard uncertainty of every line's position, mm.",
 )
-@click.option(
+@option(
     "--u-length-mm",
     type=NUMBER,
+    group=REFERENCE,
     default=0.001,
     show_default=True,
     help="Standard uncertainty of the length over all lines, mm.",
 )
-@click.option("--roi", metavar="X,Y,W,H", help="Use only this part of the picture.")
-@limit_options
+@roi_option("Use only this part of the picture.")
+@_limit_options
 @_output_options
-def scale(**options: Any) -> None:
+def scale(image: Path, **options: Any) -> None:
     """Calibrate on a line scale (stage micrometer) over all its lines, in any direction.
 
     The scale comes from the middles of the lines: blooming and the camera's response move the two edges of a line in
     opposite directions and therefore do not move its middle. The edge bias of a gap is therefore not corrected; its
     limit enters the budget.
     """
-    calibrate_on_lines(**options)
+    _calibrate("scale", image, **options)
 
 
 @command.command("response", epilog=RESPONSE_EXAMPLES)
 @click.argument("items", nargs=-1, required=True, metavar="IMAGE[=EXPOSURE]...")
-@click.option(
+@option(
     "--edges",
     is_flag=True,
     help="Estimate the response from pictures of sharp, straight, plain edges that are not clipped.",
 )
-@click.option(
+@option(
     "--densities",
     metavar="A:B:STEP|A,B,...",
     help="Measure the response on one picture of a grey wedge with these optical densities, lightest first.",
 )
-@click.option("--roi", metavar="X,Y,W,H", help="With --densities: region of the wedge's fields.")
-@click.option("-o", "--out", default="response.csv", type=click.Path(path_type=Path), show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@roi_option("With --densities: region of the wedge's fields.")
+@out_option("response.csv", "File for the response.", FILE)
+@json_option("Print the result as JSON.")
 def response(**options: Any) -> None:
     """Measure the camera's response (light for each grey level), best from a still scene at several exposures.
 
@@ -247,22 +307,25 @@ def response(**options: Any) -> None:
     --edges estimates a power law to about 5 % from the shape of straight edges, if the camera does not sharpen.
     """
     from fingervision.cli._measuring_response import measure_response
+    from fingervision.interface.argument_names import python_words
 
-    with sentences():
+    with python_words():
         measure_response(**options)
 
 
 @command.command("check", epilog=CHECK_EXAMPLES)
-@click.argument("calibration", type=click.Path(path_type=Path))
+@click.argument("calibration", type=FILE)
 @_size_options
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_option("Print the result as JSON.")
 def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | None, as_json: bool) -> None:
     """Measure an object of known size with an existing calibration and say whether both agree (E_n number)."""
-    with sentences():
+    from fingervision.interface.argument_names import python_words
+
+    with python_words():
         from fingervision.interface.calibration import Calibration
         from fingervision.interface.reference_pictures import Reference, known_sizes
 
-        references = [Reference(which, path, size_mm) for which, path, size_mm in named_references(items, "bar")]
+        references = [Reference(which, path, size_mm) for path, size_mm, which in named_references(items, "bar")]
         scale = Calibration.load(calibration)
         pictures = known_sizes(references, u_size_mm)
         results = scale.check_sizes(pictures, region_from(roi))
@@ -290,17 +353,19 @@ def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | 
 
 
 @command.command("repeat", epilog=REPEAT_EXAMPLES)
-@click.argument("tables", nargs=-1, required=True, metavar="GAPS.csv...", type=click.Path(path_type=Path))
-@click.option("--tolerance-mm", type=NUMBER, default=None, help="Full width of the tolerance, for %GRR.")
-@click.option("--by-input", is_flag=True, help="Treat every input_mm of the drive as a separate part of the study.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@click.argument("tables", nargs=-1, required=True, metavar="GAPS.csv...", type=FILE)
+@option("--tolerance-mm", type=NUMBER, help="Full width of the tolerance, for %GRR.")
+@option("--by-input", is_flag=True, help="Treat every input_mm of the drive as a separate part of the study.")
+@json_option("Print the result as JSON.")
 def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, as_json: bool) -> None:
     """Gauge repeatability and reproducibility over repeated recordings (AIAG, analysis of variance).
 
     The scatter of the frames within a recording gives the repeatability. The differences between recordings of the same
     object, set up anew each time, give the reproducibility.
     """
-    with sentences():
+    from fingervision.interface.argument_names import python_words
+
+    with python_words():
         from calib.gauge_study import gauge_study, refuse_moving, verdict
         from fingervision.storage.gaps_csv import read_gap_readings
 

@@ -4,10 +4,18 @@ from pathlib import Path
 
 import click
 
-from fingervision.cli._columns_option import columns_option
-from fingervision.cli._effects_option import effects_option
-from fingervision.cli._results_folder import results_folder, running_command
-from fingervision.cli._which_model import kind_option, models_option
+from fingervision.cli._command import FILE, make_command
+from fingervision.cli._options import (
+    columns_option,
+    effects_option,
+    json_option,
+    kind_option,
+    models_option,
+    out_option,
+    results_folder,
+    running_command,
+    seed_option,
+)
 
 EXAMPLES = """
 \b
@@ -25,23 +33,15 @@ Files written to --out:
 """
 
 
-@click.command(epilog=EXAMPLES)
-@click.argument("measured", type=click.Path(path_type=Path))
+@make_command(EXAMPLES)
+@click.argument("measured", type=FILE)
 @models_option
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("comparison"),
-    show_default=True,
-    help="Folder for the results.",
-)
-@click.option(
-    "--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the bootstrap for the threshold."
-)
 @kind_option
 @effects_option
 @columns_option
-@click.option("--json", "as_json", is_flag=True, help="Print compare.json.")
+@out_option("comparison")
+@json_option("Print compare.json.")
+@seed_option("Seed of the bootstrap for the threshold.")
 def command(
     measured: Path,
     model_paths: tuple[Path, ...],

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
-from fingervision.cli._effects_option import effects_option
-from fingervision.cli._on_bed import hide_option
+from fingervision.cli._command import make_command
+from fingervision.cli._options import effects_option, hide_option, out_option, seed_option
 
 EXAMPLES = """
 \b
@@ -17,14 +17,11 @@ Examples:
 UNSEPARATED = "one of several explanations that no proposed run separates"
 
 
-@click.command(epilog=EXAMPLES)
+@make_command(EXAMPLES)
 @hide_option
 @effects_option
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True,
-              help="Seed of all randomness; without --hide, it also chooses the hidden effect.")  # fmt: skip
-@click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("demo"), show_default=True, help="Folder for the results."
-)
+@out_option("demo")
+@seed_option("Seed of all randomness; without --hide, it also chooses the hidden effect.")
 def command(hide: tuple[str, ...], seed: int, out: Path) -> None:
     """Add an effect to the simulated test bed, run a recipe, measure its video, and identify the added effect.
 

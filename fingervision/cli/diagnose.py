@@ -4,10 +4,18 @@ from pathlib import Path
 
 import click
 
-from fingervision.cli._columns_option import columns_option
-from fingervision.cli._effects_option import effects_option
-from fingervision.cli._results_folder import results_folder, running_command
-from fingervision.cli._which_model import kind_option, model_option
+from fingervision.cli._command import FILE, MODEL, make_command, option
+from fingervision.cli._options import (
+    columns_option,
+    effects_option,
+    json_option,
+    kind_option,
+    model_option,
+    out_option,
+    results_folder,
+    running_command,
+    seed_option,
+)
 
 EXAMPLES = """
 \b
@@ -28,34 +36,25 @@ With --reference, instead of these:
 """
 
 
-@click.command(epilog=EXAMPLES)
-@click.argument("measured", type=click.Path(path_type=Path))
+@make_command(EXAMPLES)
+@click.argument("measured", type=FILE)
 @model_option
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("diagnosis"),
-    show_default=True,
-    help="Folder for the results.",
-)
-@click.option(
+@kind_option
+@option(
     "--reference",
-    type=click.Path(path_type=Path),
+    type=FILE,
+    group=MODEL,
     help="Table of the same specimen while it was healthy: say what changed since, and at which hinge.",
 )
-@click.option("--with", "forced", multiple=True, metavar="EFFECT", help="Include this effect in every explanation.")
-@click.option("--without", multiple=True, metavar="EFFECT", help="Exclude this effect from every explanation.")
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=1,
-    show_default=True,
-    help="Seed of the bootstrap; the same seed gives the same report.",
+@option(
+    "--with", "forced", multiple=True, metavar="EFFECT", group=MODEL, help="Include this effect in every explanation."
 )
-@kind_option
+@option("--without", multiple=True, metavar="EFFECT", group=MODEL, help="Exclude this effect from every explanation.")
 @effects_option
 @columns_option
-@click.option("--json", "as_json", is_flag=True, help="Print report.json.")
+@out_option("diagnosis")
+@json_option("Print report.json.")
+@seed_option("Seed of the bootstrap; the same seed gives the same report.")
 def command(
     measured: Path,
     model_path: Path,

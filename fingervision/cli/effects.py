@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from fingervision.cli._effects_option import effects_option
+from fingervision.cli._command import make_command
+from fingervision.cli._options import effects_option, figure_option
 from fingervision.domain.errors import UsageError
 
 EXAMPLES = """
@@ -16,12 +17,10 @@ Examples:
 """
 
 
-@click.command(epilog=EXAMPLES)
+@make_command(EXAMPLES)
 @click.argument("name", required=False)
-@click.option(
-    "--figure", type=click.Path(path_type=Path, dir_okay=False), help="Plot the residual that the effect causes."
-)
 @effects_option
+@figure_option("Plot the residual that the effect causes.")
 def command(name: str | None, figure: Path | None) -> None:
     """List the physical effects, or explain the effect NAME."""
     from difflib import get_close_matches

@@ -4,6 +4,9 @@ from pathlib import Path
 
 import click
 
+from fingervision.cli._command import make_command
+from fingervision.cli._options import out_option
+
 EXAMPLES = """
 \b
 Examples:
@@ -16,9 +19,9 @@ The examples of `fingervision NAME --help` work in the folder that `fingervision
 """
 
 
-@click.command(epilog=EXAMPLES)
+@make_command(EXAMPLES)
 @click.argument("name", required=False)
-@click.option("--out", type=click.Path(path_type=Path), help="The new folder; example-NAME if not given.")
+@out_option(words="The new folder; example-NAME if not given.")
 def command(name: str | None, out: Path | None) -> None:
     """Copy the runnable example NAME into a new folder, or list all examples."""
     from fingervision.domain.errors import UsageError

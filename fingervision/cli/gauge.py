@@ -4,10 +4,9 @@ from pathlib import Path
 
 import click
 
-from fingervision.cli._live_choices import choices_of
-from fingervision.cli._number import NUMBER
-from fingervision.cli._where_to_measure import where_to_measure
-from fingervision.cli.live import USUAL_OUT, port_of_page
+from fingervision.cli._command import FILE, MEASURED, PAGE, make_command, option
+from fingervision.cli._options import out_option, port_option, rate_option, where_to_measure
+from fingervision.cli.live import LIVE_FOLDER, choices_of
 from fingervision.domain.errors import UsageError
 
 EXAMPLES = """
@@ -15,7 +14,7 @@ EXAMPLES = """
 Examples, in the folder of `fingervision example measure`:
   fingervision gauge opening.mp4 --px-per-mm 34
   fingervision gauge opening.mp4 --px-per-mm 34 --gauges levers.toml
-  fingervision gauge opening.mp4 --calibration calibration.json --no-browser
+  fingervision gauge opening.mp4 --calibration calibration.json --no-page
 
 \b
 To add a gauge in the panel, choose its kind and drag over the first video frame (across an edge, along a line, over a
@@ -23,34 +22,36 @@ circle or a patch), or press Add and type its numbers. Arrow keys move the chose
 The value of a gauge is shown at once, computed by the code of `measure`. Save writes the gauges file and keeps the
 comments in it; then `fingervision measure opening.mp4 --px-per-mm 34 --gauges gauges.toml` measures every frame.
 """
-USUAL_GAUGES = Path("gauges.toml")
 
 
-@click.command(epilog=EXAMPLES)
+@make_command(EXAMPLES)
 @click.argument("recording")
-@click.option(
+@option(
     "--gauges",
-    type=click.Path(path_type=Path),
-    default=USUAL_GAUGES,
+    type=FILE,
+    default="gauges.toml",
     show_default="gauges.toml in the current folder",
+    group=MEASURED,
     help="Gauges file: read if it exists, and saved to.",
 )
-@click.option("--rate-hz", type=NUMBER, help="Images per second, if the images carry no times.")
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    help="Folder for the measurements that the browser page saves.  [default: live]",
-)
-@port_of_page
-@click.option("--no-browser", is_flag=True, help="Print the address of the browser page, but open no browser.")
 @where_to_measure
+@rate_option
+@port_option
+@option(
+    "--no-page",
+    is_flag=True,
+    former=("--no-browser",),
+    group=PAGE,
+    help="Print the address of the browser page, but do not open it.",
+)
+@out_option(words="Folder for the measurements that the browser page saves.  [default: live]")
 def command(
     recording: str,
     gauges: Path,
     rate_hz: float | None,
     out: Path | None,
     port: int,
-    no_browser: bool,
+    no_page: bool,
     calibration: Path | None,
     px_per_mm: float | None,
     u_px_per_mm: float | None,
@@ -76,5 +77,5 @@ def command(
             "`fingervision live CAMERA --gauges FILE`."
         )
     choices = choices_of(None, calibration, (px_per_mm, u_px_per_mm), below_tip_mm, tips, roi)
-    showing = Showing(page=True, json_lines=False, way=Access(port=port), record=False, browser=not no_browser)
-    look_through(recorded(recording, rate_hz, choices, ()), out or USUAL_OUT, showing, Beside(), gauges)
+    showing = Showing(page=True, json_lines=False, way=Access(port=port), record=False, browser=not no_page)
+    look_through(recorded(recording, rate_hz, choices, ()), out or LIVE_FOLDER, showing, Beside(), gauges)

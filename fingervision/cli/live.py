@@ -1,14 +1,25 @@
 """`fingervision live`: show the camera's picture with the measured points, the gap, and the gap over time."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from fingervision.cli._live_choices import choices_of
-from fingervision.cli._number import NUMBER
-from fingervision.cli._where_to_measure import where_to_measure
-from fingervision.cli._which_model import ModelPath
+from fingervision.cli._command import BED, CAMERA, FILE, MEASURED, MODEL, MODEL_FILE, NUMBER, PAGE, make_command, option
+from fingervision.cli._options import (
+    drive_options,
+    hide_option,
+    json_option,
+    kind_option,
+    out_option,
+    port_option,
+    region_from,
+    where_to_measure,
+)
 from fingervision.domain.errors import UsageError
+
+if TYPE_CHECKING:
+    from fingervision.live.choices import Choices
 
 EXAMPLES = """
 \b
@@ -37,96 +48,84 @@ events.jsonl, run.json. `fingervision measure RUN/video.mp4` gives the same valu
 Settings requested from a camera are read back; a setting that the camera did not accept is reported. The camera is
 asked to keep exposure, focus and white balance constant.
 """
-USUAL_OUT, USUAL_PORT = Path("live"), 8025
-port_of_page = click.option(
-    "--port",
-    type=click.IntRange(0, 65535),
-    default=USUAL_PORT,
-    show_default=True,
-    help="Network port of the browser page; 0: any free port.",
-)
+LIVE_FOLDER = Path("live")
 
 
-@click.command(epilog=EXAMPLES)
+@make_command(EXAMPLES)
 @click.argument("source", required=False)
-@click.option("--list", "list_cameras", is_flag=True, help="List the cameras of this computer.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for runs and snapshots.  [default: live]")
-@click.option("--as-camera", is_flag=True, help="Play a recording once in real time, as if it came from a camera.")
-@click.option("--no-page", is_flag=True, help="Open no browser page; print gap, status and rate in the terminal.")
-@click.option("--json", "as_json", is_flag=True, help="Print one line of JSON per frame, with the columns of gaps.csv.")
-@click.option(
-    "--host", default="127.0.0.1", show_default=True, help="Network address at which the browser page is served."
+@where_to_measure
+@option(
+    "--gauges",
+    type=FILE,
+    group=MEASURED,
+    help="File of user-defined gauges, which the browser page shows, measures and edits; it need not exist.",
 )
-@port_of_page
-@click.option(
-    "--password-file",
-    type=click.Path(path_type=Path),
-    help="Text file with the password of the browser page; required if other computers can reach it.",
-)
-@click.option(
-    "--tls-cert",
-    type=click.Path(path_type=Path),
-    help="Certificate (PEM) with which the browser page is served over TLS.",
-)
-@click.option("--tls-key", type=click.Path(path_type=Path), help="Private key of the certificate (PEM).")
-@click.option("--size", metavar="WxH", help="Picture size to request from the camera.")
-@click.option("--rate-hz", type=NUMBER, help="Frames per second to request from the camera.")
-@click.option(
+@option("--list", "list_cameras", is_flag=True, group=CAMERA, help="List the cameras of this computer.")
+@option("--size", metavar="WxH", group=CAMERA, help="Picture size to request from the camera.")
+@option("--rate-hz", type=NUMBER, group=CAMERA, help="Frames per second to request from the camera.")
+@option(
     "--format",
     "pixel_format",
     metavar="FOUR",
+    group=CAMERA,
     help="Pixel format to request, such as YUYV (raw) or MJPG.  [default: raw]",
 )
-@click.option("--exposure-ms", type=NUMBER, help="Exposure time to request, in ms.")
-@click.option("--gain", type=NUMBER, help="Gain (amplification) to request, in the camera's own units.")
-@click.option("--focus", type=NUMBER, help="Focus to request, in the camera's own units.")
-@click.option("--white-balance-k", type=NUMBER, help="Colour temperature of the white balance to request, in kelvin.")
-@click.option(
-    "--model",
-    "model_path",
-    type=ModelPath(),
-    help="Compare the gap with this model while it is measured.",
-)
-@click.option(
-    "--kind",
-    type=click.Choice(["stiffness_matrix", "lumped", "finite_element"]),
-    default="lumped",
-    show_default=True,
-    help="Kind of model by which a gripper.toml is computed.",
-)
-@click.option(
-    "--drive",
-    type=click.Path(path_type=Path),
-    help="Log of the stage (drive.csv) on the clock of this live view or recording.",
-)
-@click.option(
-    "--drive-offset-s",
+@option("--exposure-ms", type=NUMBER, group=CAMERA, help="Exposure time to request, in ms.")
+@option("--gain", type=NUMBER, group=CAMERA, help="Gain (amplification) to request, in the camera's own units.")
+@option("--focus", type=NUMBER, group=CAMERA, help="Focus to request, in the camera's own units.")
+@option(
+    "--white-balance-k",
     type=NUMBER,
-    help="Clock offset in seconds, added to the drive's times; determined for a recording if not given.",
+    group=CAMERA,
+    help="Colour temperature of the white balance to request, in kelvin.",
 )
-@click.option(
-    "--gauges",
-    type=click.Path(path_type=Path),
-    help="File of user-defined gauges, which the browser page shows, measures and edits; it need not exist.",
+@option(
+    "--as-camera",
+    is_flag=True,
+    group=CAMERA,
+    help="Play a recording once in real time, as if it came from a camera.",
 )
-@click.option(
+@option(
+    "--model", "model_path", type=MODEL_FILE, group=MODEL, help="Compare the gap with this model while it is measured."
+)
+@kind_option
+@drive_options(
+    "Log of the stage (drive.csv) on the clock of this live view or recording.",
+    "Clock offset in seconds, added to the drive's times; determined for a recording if not given.",
+)
+@option(
     "--bed",
     "bed_name",
     metavar="simulated|CONFIG.toml",
+    group=BED,
     help="Test bed whose camera is the source: the word simulated, or its configuration file.",
 )
-@click.option(
-    "--hide",
-    multiple=True,
-    metavar="EFFECT[:PARAMETER=VALUE,...]",
-    help="Hide an effect in the simulated test bed: the measurement does not know it.",
-)
-@click.option(
+@hide_option
+@option(
     "--allow-motion",
     is_flag=True,
+    group=BED,
     help="Allow the browser page to move the test bed's stage; otherwise it can only show and stop it.",
 )
-@where_to_measure
+@option("--no-page", is_flag=True, group=PAGE, help="Open no browser page; print gap, status and rate in the terminal.")
+@option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    group=PAGE,
+    help="Network address at which the browser page is served.",
+)
+@port_option
+@option(
+    "--password-file",
+    type=FILE,
+    group=PAGE,
+    help="Text file with the password of the browser page; required if other computers can reach it.",
+)
+@option("--tls-cert", type=FILE, group=PAGE, help="Certificate (PEM) with which the browser page is served over TLS.")
+@option("--tls-key", type=FILE, group=PAGE, help="Private key of the certificate (PEM).")
+@out_option(words="Folder for runs and snapshots.  [default: live]")
+@json_option("Print one line of JSON per frame, with the columns of gaps.csv.")
 def command(
     source: str | None,
     list_cameras: bool,
@@ -210,18 +209,58 @@ def command(
         from fingervision.live.bed.opening import opened_bed
 
         bed_capture, bed_choices = opened_bed(bed_name, hide, choices)
-        run(bed_capture, bed_choices, out or USUAL_OUT, showing, beside)
+        run(bed_capture, bed_choices, out or LIVE_FOLDER, showing, beside)
         return
     assert source is not None  # noqa: S101 - asked before
     if not no_page and not as_camera and is_recording(source):
         if size is not None:
             raise UsageError(f"--size is for cameras, but {source} is a recording: leave it out.")
         seen = recorded(source, rate_hz, choices, _drive_options(drive, drive_offset_s))
-        look_through(seen, out or USUAL_OUT, showing, beside, gauges)
+        look_through(seen, out or LIVE_FOLDER, showing, beside, gauges)
         return
     camera = CameraWish(pixel_format, exposure_ms, gain, focus, white_balance_k)
     capture = opened(source, Wish(rate_hz, None if size is None else _size(size), camera))
-    run(capture, choices, out or USUAL_OUT, showing, beside)
+    run(capture, choices, out or LIVE_FOLDER, showing, beside)
+
+
+def choices_of(
+    source: str | None,
+    calibration: Path | None,
+    stated: tuple[float | None, float | None],
+    below_tip_mm: float,
+    tips: str,
+    roi: str | None,
+) -> "Choices":
+    """Read scale, measuring height, direction of the tips, and region of interest from the options.
+
+    The argument `stated` contains the values of --px-per-mm and --u-px-per-mm.
+
+    Raises
+    ------
+    DataError, InputFileError
+        The calibration cannot be read.
+    UsageError
+        An option makes no sense.
+    """
+    from fingervision.domain.direction import Direction
+    from fingervision.domain.region import Region
+    from fingervision.frames import simulated
+    from fingervision.interface.measuring_task import scale_of
+    from fingervision.live.choices import Choices
+    from fingervision.measuring.scale import check_one_scale
+
+    check_one_scale(calibration, *stated)
+    px_per_mm, u_px_per_mm = stated
+    if calibration is None and px_per_mm is None and source is not None and simulated.accepts(source):
+        px_per_mm = simulated.PX_PER_MM
+    box = region_from(roi)
+    return Choices(
+        scale=None if calibration is None and px_per_mm is None else scale_of(calibration, px_per_mm, u_px_per_mm)[0],
+        scale_file=calibration,
+        below_tip_mm=below_tip_mm,
+        direction=None if tips == "auto" else Direction(tips),
+        region=None if box is None else Region(*box),
+    )
 
 
 def _drive_options(drive: Path | None, offset_s: float | None) -> tuple[str, ...]:

@@ -1,17 +1,28 @@
 """`fingervision measure`: measure the finger gap over time in a recording."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from fingervision.cli._columns_option import columns_option
-from fingervision.cli._number import NUMBER
-from fingervision.cli._where_to_measure import how_to_read_pictures, region_of, where_to_measure
+from fingervision.cli._command import FILE, MEASURED, OUTPUT, make_command, option
+from fingervision.cli._options import (
+    columns_option,
+    drive_options,
+    how_to_read_pictures,
+    json_option,
+    out_option,
+    rate_option,
+    region_from,
+    where_to_measure,
+)
 from fingervision.domain.errors import UsageError
 
 if TYPE_CHECKING:
+    from fingervision.measuring.drawing_placement import GivenPoint
     from fingervision.measuring.measure import Measured
+    from fingervision.measuring.task import Task
+    from fingervision.models.mechanism import Mechanism
 
 EXAMPLES = """
 \b
@@ -43,93 +54,85 @@ Exit codes: 0 done; 1 failed, or fewer than one frame in ten shows fingers; 2 wr
 """
 
 
-@click.command(epilog=EXAMPLES)
+@make_command(EXAMPLES)
 @click.argument("recording")
 @where_to_measure
-@click.option("--rate-hz", type=NUMBER, help="Images per second, if the images carry no times.")
-@click.option("--frames", metavar="FIRST:LAST", help="Measure only these frames; counted from 0, both included.")
-@click.option(
-    "--drive",
-    type=click.Path(path_type=Path),
-    help="Log of the stage: drive.csv (time_s,input_mm[,run][,force_n]) or a table of any program.",
-)
-@columns_option
-@click.option(
-    "--drive-offset-s",
-    type=NUMBER,
-    help="Clock offset in seconds, added to the drive's times; determined from the motion if not given.",
-)
 @how_to_read_pictures
-@click.option(
+@option(
     "--face",
     type=click.Choice(["front", "outline"]),
     default="front",
     show_default=True,
+    group=MEASURED,
     help="Edge to measure on a thick part: that of the face towards the camera, or the outline with side walls.",
 )
-@click.option(
+@option(
+    "--frames",
+    metavar="FIRST:LAST",
+    group=MEASURED,
+    help="Measure only these frames; counted from 0, both included.",
+)
+@option(
     "--gauges",
-    type=click.Path(path_type=Path),
+    type=FILE,
+    group=MEASURED,
     help="Also measure user-defined gauges (gauges.toml): edges, lines, circles, marks, patches.",
 )
-@click.option(
+@option(
     "--mechanism",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
+    type=FILE,
+    group=MEASURED,
     help="gripper.toml or mechanism.toml: also measure the poses of its bodies; written to bodies.csv.",
 )
-@click.option(
+@option(
     "--at",
     "points",
     multiple=True,
     metavar="X,Y=XMM,YMM",
+    group=MEASURED,
     help="With --mechanism: pixel X,Y of the first frame shows point XMM,YMM of the drawing; give three such points.",
 )
-@click.option("--overlay", is_flag=True, help="Also write overlay.mp4, the video with the measurement drawn in.")
-@click.option(
+@rate_option
+@drive_options(
+    "Log of the stage: drive.csv (time_s,input_mm[,run][,force_n]) or a table of any program.",
+    "Clock offset in seconds, added to the drive's times; determined from the motion if not given.",
+)
+@columns_option
+@out_option(words="Folder for the results; measured/<name of the recording> if not given.")
+@option(
+    "--overlay",
+    is_flag=True,
+    group=OUTPUT,
+    help="Also write overlay.mp4, the video with the measurement drawn in.",
+)
+@option(
     "--steps",
     "steps_frame",
     type=int,
     metavar="FRAME",
+    group=OUTPUT,
     help="Also write a picture of every processing step of this frame (counted from 0).",
 )
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    help="Folder for the results; measured/<name of the recording> if not given.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+@json_option("Print the summary as JSON.")
 def command(
     recording: str,
     calibration: Path | None,
     px_per_mm: float | None,
     u_px_per_mm: float | None,
-    below_tip_mm: float,
-    tips: str,
     roi: str | None,
     rate_hz: float | None,
     frames: str | None,
-    drive: Path | None,
-    columns: Path | None,
-    drive_offset_s: float | None,
-    response: str,
-    bits: int | None,
-    fingers: str,
-    face: str,
-    gauges: Path | None,
     mechanism: Path | None,
     points: tuple[str, ...],
-    overlay: bool,
-    steps_frame: int | None,
     out: Path | None,
     as_json: bool,
+    **options: Any,
 ) -> None:
     """Measure the gap between two fingers in RECORDING: a video file, a folder of images, or a glob in quotes.
 
     The gap is the distance between the fingers' inner edges, 0.3 mm below their tips, in every frame, with its standard
     uncertainty. One of --calibration and --px-per-mm is required.
     """
-    from fingervision.domain.errors import UsageError
     from fingervision.interface.measure import measure_into
     from fingervision.interface.measuring_task import measuring_task, scale_of
 
@@ -139,34 +142,14 @@ def command(
             "--mechanism FILE, or leave --at out."
         )
     task = measuring_task(
-        scale=scale_of(calibration, px_per_mm, u_px_per_mm),
-        below_tip_mm=below_tip_mm,
-        tips=tips,
-        roi=region_of(roi),
-        drive=drive,
-        drive_offset_s=drive_offset_s,
-        columns=columns,
-        response=response,
-        bits=bits,
-        fingers=fingers,
-        face=face,
-        overlay=overlay,
-        steps_frame=steps_frame,
-        frames=_frames(frames),
-        gauges=gauges,
+        scale=scale_of(calibration, px_per_mm, u_px_per_mm), roi=region_from(roi), frames=_frames(frames), **options
     )
-    follow = None
-    if mechanism is not None:
-        from fingervision.cli._measure_bodies import body_follower
-
-        # Errors of the drawing or its points are reported before the recording is measured.
-        follow = body_follower(mechanism, points)
+    # Errors of the drawing or its points are reported before the recording is measured.
+    drawing = None if mechanism is None else _drawing(mechanism, points)
     measured = measure_into(out, recording, task, rate_hz, progress=True)
     _report(measured, as_json)
-    if follow is not None:
-        from fingervision.frames.source import Wish, open_source
-
-        follow(open_source(recording, Wish(rate_hz=rate_hz)), task, measured.folder.path, as_json)
+    if drawing is not None:
+        _measure_bodies(recording, rate_hz, task, drawing, measured.folder.path, as_json=as_json)
     raise SystemExit(int(measured.exit_code))
 
 
@@ -177,6 +160,51 @@ def _frames(words: str | None) -> tuple[int, int] | None:
     if not (first.isascii() and first.isdigit() and last.isascii() and last.isdigit()):
         raise UsageError(f"--frames must be FIRST:LAST, two whole numbers such as 100:250, but is '{words}'.")
     return int(first), int(last)
+
+
+def _drawing(path: Path, points: tuple[str, ...]) -> tuple["Mechanism", list["GivenPoint"]]:
+    """Read a mechanism.toml, or a gripper.toml as a mechanism of its two halves, and the points that place it."""
+    from fingervision.measuring.drawing_placement import parse_point
+    from fingervision.models.gripper_mechanism import whole_mechanism
+    from fingervision.storage.gripper_toml import read_gripper
+    from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
+
+    given = [parse_point(text) for text in points]
+    if is_mechanism(path):
+        return read_mechanism(path), given
+    gripper = read_gripper(path)
+    return whole_mechanism(gripper, gripper, path.stem), given
+
+
+def _measure_bodies(
+    recording: str,
+    rate_hz: float | None,
+    task: "Task",
+    drawing: tuple["Mechanism", list["GivenPoint"]],
+    folder: Path,
+    *,
+    as_json: bool,
+) -> None:
+    """Write bodies.csv, and print in how many frames each body was found."""
+    from fingervision.frames.source import Wish, open_source
+    from fingervision.measuring.body_poses import measure_bodies
+    from fingervision.measuring.frame_loop import coded, prepared
+    from fingervision.measuring.task import task_for_frames
+
+    source = open_source(recording, Wish(rate_hz=rate_hz))
+    task = task_for_frames(task, source.description)
+    how = prepared(source.description, task)
+    frames = coded(source, how.description.coding)
+    done = measure_bodies(frames, drawing[0], task.scale, drawing[1], folder, how.settings)
+    if as_json:
+        return
+    for name, counts in done.counts.items():
+        others = ", ".join(f"{count} {status}" for status, count in counts.items() if status != "ok")
+        said = f" ({others})" if others else ""
+        click.echo(f"  {name}: seen in {counts['ok']} of {sum(counts.values())} frames{said}")
+    for note in () if done.placed is None else done.placed.notes:
+        click.echo(f"  note: {note}")
+    click.echo(f"  {done.path}")
 
 
 def _report(measured: "Measured", as_json: bool) -> None:

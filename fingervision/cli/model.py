@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fingervision.cli._columns_option import columns_option
-from fingervision.cli._kind_choice import KindChoice
-from fingervision.cli._number import NUMBER
-from fingervision.cli._results_folder import results_folder
+from fingervision.cli._command import CLOCK, FILE, MODEL, NUMBER, OUTPUT, KindName, make_command, option
+from fingervision.cli._options import columns_option, json_option, out_option, results_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,6 +24,8 @@ _PREDICTED = (
     "uncertainty.png", "modes.mp4",
 )  # fmt: skip
 """Names of the result files of the two kinds of call."""
+ASKED = "What is computed"
+"""Group of the help."""
 _EPILOG = """\b
 Examples:
   fingervision model gripper.toml --kind all --drive drive.csv --out model
@@ -39,61 +39,94 @@ Examples:
 """
 
 
-@click.command(epilog=_EPILOG)
-@click.argument("gripper_toml", metavar="DRAWING.toml", type=click.Path(path_type=Path))
-@click.option(
+@make_command(_EPILOG)
+@click.argument("gripper_toml", metavar="DRAWING.toml", type=FILE)
+@option(
     "--kind",
-    type=KindChoice("all"),
+    type=KindName("all"),
     default="all",
     show_default=True,
+    group=MODEL,
     help="Kind of model by which the drawing is computed.",
 )
-@click.option(
-    "--drive",
-    type=click.Path(path_type=Path),
-    help="Log of the stage (drive.csv or another table), for which the response over time is computed.",
+@option(
+    "--hinge",
+    type=click.Choice(["corrected", "beam"]),
+    default="corrected",
+    show_default=True,
+    group=MODEL,
+    help="Hinge compliance: beam theory corrected by finite elements, or beam theory alone.",
 )
-@columns_option
-@click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("model"), show_default=True, help="Folder for the results."
+@option(
+    "--large-rotation",
+    is_flag=True,
+    group=MODEL,
+    help="Compute the equilibrium in the deformed shape (not with stiffness_matrix).",
 )
-@click.option("--hinge", type=click.Choice(["corrected", "beam"]), default="corrected", show_default=True,
-              help="Hinge compliance: beam theory corrected by finite elements, or beam theory alone.")  # fmt: skip
-@click.option(
-    "--large-rotation", is_flag=True, help="Compute the equilibrium in the deformed shape (not with stiffness_matrix)."
+@option(
+    "--contact",
+    is_flag=True,
+    group=MODEL,
+    help="Stop the fingers where they touch each other (not with stiffness_matrix).",
 )
-@click.option(
-    "--contact", is_flag=True, help="Stop the fingers where they touch each other (not with stiffness_matrix)."
+@option(
+    "--vary",
+    multiple=True,
+    metavar="NAME=A:B:N",
+    group=ASKED,
+    help="Vary one number of the drawing over N values from A to B (repeatable: a grid); write vary.csv and vary.png, "
+    "computed by the lumped model.",
 )
-@click.option("--modes", metavar="N|F", help="Compute and plot N natural modes of each family, or all up to a "
-              "frequency such as 500Hz.")  # fmt: skip
-@click.option("--film", is_flag=True, help="With --modes: also write modes.mp4, a film of the mode shapes.")
-@click.option(
+@option(
+    "--modes",
+    metavar="N|F",
+    group=ASKED,
+    help="Compute and plot N natural modes of each family, or all up to a frequency such as 500Hz.",
+)
+@option("--film", is_flag=True, group=ASKED, help="With --modes: also write modes.mp4, a film of the mode shapes.")
+@option(
     "--frequency",
     metavar="A:B",
+    group=ASKED,
     help="Compute the response to a drive that vibrates at A to B Hz: frequency.csv and frequency.png.",
 )
-@click.option(
+@option(
     "--damping",
     default="modal:0.025",
     show_default=True,
     metavar="LAW",
+    group=ASKED,
     help="Damping law of vibrations: modal:RATIO, loss:FACTOR, rayleigh:RATIO:HZ:HZ or paper[:GAMMA] (equation 4 of "
     "Hricko and Havlik, 2015, above the lowest mode).",
 )
-@click.option("--rate-hz", type=NUMBER, help="Rows per second of response.csv, in addition to the drive's own samples.")
-@click.option(
+@option(
     "--object-mm",
     type=NUMBER,
+    group=ASKED,
     help="Width (mm) of a part to grip between the fingers or a pair of probes: grip.csv and grip.png.",
 )
-@click.option(
-    "--object-n-mm", type=NUMBER, help="With --object-mm: stiffness of the part in N/mm; a rigid part if not given."
+@option(
+    "--object-n-mm",
+    type=NUMBER,
+    group=ASKED,
+    help="With --object-mm: stiffness of the part in N/mm; a rigid part if not given.",
 )
-@click.option("--mesh", is_flag=True, help="Write a picture of the finite-element mesh, mesh.png.")
-@click.option("--vary", multiple=True, metavar="NAME=A:B:N", help="Vary one number of the drawing over N values from "
-              "A to B (repeatable: a grid); write vary.csv and vary.png, computed by the lumped model.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print the table as JSON.")
+@option(
+    "--drive",
+    type=FILE,
+    group=CLOCK,
+    help="Log of the stage (drive.csv or another table), for which the response over time is computed.",
+)
+@columns_option
+@option(
+    "--rate-hz",
+    type=NUMBER,
+    group=CLOCK,
+    help="Rows per second of response.csv, in addition to the drive's own samples.",
+)
+@out_option("model")
+@option("--mesh", is_flag=True, group=OUTPUT, help="Write a picture of the finite-element mesh, mesh.png.")
+@json_option("Print the table as JSON.")
 def command(
     gripper_toml: Path,
     kind: str,

@@ -4,6 +4,9 @@ from typing import Any
 
 import click
 
+from fingervision.cli._command import OUTPUT, make_command, option
+from fingervision.cli._options import json_option
+
 EXAMPLES = """
 \b
 Examples:
@@ -20,9 +23,9 @@ fingervision/plugins says what each part must define; fingervision.testing has t
 """
 
 
-@click.command(epilog=EXAMPLES)
-@click.option("--all", "every", is_flag=True, help="Also list built-in parts.")
-@click.option("--json", "as_json", is_flag=True, help="Print the list as JSON, with built-in parts.")
+@make_command(EXAMPLES)
+@option("--all", "every", is_flag=True, group=OUTPUT, help="Also list built-in parts.")
+@json_option("Print the list as JSON, with built-in parts.")
 def command(every: bool, as_json: bool) -> None:
     """List the installed plug-ins with their origin, and those that could not be used with the reason."""
     import json

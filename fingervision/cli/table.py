@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fingervision.cli._columns_option import columns_option
+from fingervision.cli._command import FILE, make_command, option
+from fingervision.cli._options import columns_option, figure_option, json_option, out_option
 
 if TYPE_CHECKING:
     from fingervision.tables.account import Account
@@ -15,10 +16,10 @@ EXAMPLES = """
 \b
 Examples:
   fingervision table stage.lvm
-  fingervision table comsol.txt --as simulation
-  fingervision table table1.csv --as simulation --set columns.gap=comsol_mm
+  fingervision table comsol.txt --kind simulation
+  fingervision table table1.csv --kind simulation --set columns.gap=comsol_mm
   fingervision table log.csv --set units.time=ms --set units.input='0.1 um'
-  fingervision table stage.lvm --png stage.png
+  fingervision table stage.lvm --figure stage.png
 
 \b
 Formats: text of any convention (CSV, COMSOL, LabVIEW .lvm), .xlsx, .mat, .parquet and .tdms.
@@ -36,26 +37,26 @@ Exit codes: 0 interpreted, and columns.toml is written; 1 ambiguous: the message
 """
 
 
-@click.command(epilog=EXAMPLES)
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "--as",
-    "kind",
+@make_command(EXAMPLES)
+@click.argument("file", type=FILE)
+@option(
+    "--kind",
     type=click.Choice(["measured", "drive", "simulation"]),
+    former=("--as",),
     help="Kind of table; recognised if not given.",
 )
-@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Set one key of columns.toml; repeatable.")
+@option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="Set one key of columns.toml; repeatable.")
 @columns_option
-@click.option("--out", type=click.Path(path_type=Path), help="File to write; columns.toml beside FILE if not given.")
-@click.option("--png", type=click.Path(path_type=Path), help="Also plot the curve to this picture.")
-@click.option("--json", "as_json", is_flag=True, help="Print the interpretation as JSON.")
+@out_option(words="File to write; columns.toml beside FILE if not given.", kind=FILE)
+@figure_option("Also plot the curve to this picture.", "--png")
+@json_option("Print the interpretation as JSON.")
 def command(
     file: Path,
     kind: str | None,
     settings: tuple[str, ...],
     columns: Path | None,
     out: Path | None,
-    png: Path | None,
+    figure: Path | None,
     as_json: bool,
 ) -> None:
     """Show how FILE, a table of any program, is interpreted, and write this interpretation to columns.toml.
@@ -83,8 +84,8 @@ def command(
         click.echo(json.dumps(found.document(), indent=2, allow_nan=False, ensure_ascii=False))
     else:
         _print(found)
-    if png is not None:
-        _draw(found, png)
+    if figure is not None:
+        _draw(found, figure)
     if found.question is not None:
         if isinstance(found.question, OpenQuestionError):
             _keep(settings, target, file, None if found.also else found.kind, decided[found.kind])
@@ -159,7 +160,7 @@ def _draw(found: "Account", png: Path) -> None:
 
     curve = found.curve()
     if curve is None:
-        raise found.question or DataError(f"{found.path} has no two columns to draw: leave out --png.")
+        raise found.question or DataError(f"{found.path} has no two columns to draw: leave out --figure.")
     from matplotlib.figure import Figure
 
     x_name, x, y_name, y = curve

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from calib.calibration import BareScale
 from fingervision.domain.errors import ArgumentError
-from fingervision.domain.region import Region
 from fingervision.frames.source import FrameSource, Wish, open_source
 from fingervision.inspection.catalogue import inspect as findings_of
 from fingervision.inspection.catalogue import to_mend
@@ -158,7 +157,7 @@ def inspect(
             scale=scale_of(calibration, px_per_mm, u_px_per_mm) if has_scale else (unscaled, None),
             below_tip_mm=below_tip_mm,
             tips=tips,
-            roi=None if (box := region_of(roi)) is None else Region(*box),
+            roi=region_of(roi),
             response=response,
             bits=bits,
             fingers=fingers,

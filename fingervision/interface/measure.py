@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calib.calibration import BareScale
-from fingervision.domain.region import Region
 from fingervision.frames.source import FrameSource, Wish, open_source
 from fingervision.interface.argument_checks import region_of
 from fingervision.interface.argument_names import speaks_python
@@ -151,7 +150,7 @@ def measure(
         scale=scale,
         below_tip_mm=below_tip_mm,
         tips=tips,
-        roi=None if (box := region_of(roi)) is None else Region(*box),
+        roi=region_of(roi),
         drive=drive,
         drive_offset_s=drive_offset_s,
         columns=None if columns is None else Path(columns),

@@ -90,7 +90,7 @@ class OpenQuestionError(FingervisionError):
         keys = " ".join(f"--set {_quoted(each.key)}" for each in questions)
         name = _quoted(str(path))
         words = kind if kind in ("drive", "table") else f"{kind} table"
-        use = f" --as {kind}" if kind != "table" else ""
+        use = f" --kind {kind}" if kind != "table" else ""
         pick = ", with the keys of the readings that are right," if any(len(q.readings) > 1 for q in questions) else ","
         begin = f"must have a column {missing}" if missing else f"cannot be read as a {words} without a decision"
         super().__init__(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fingervision.cli import cli, main
-from fingervision.cli._number import Number
+from fingervision.cli._command import Number
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.rendering.clip import Ffv1, write_clip

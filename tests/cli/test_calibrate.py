@@ -12,8 +12,7 @@ from click.testing import CliRunner, Result
 
 from calib.camera_response import standard_response
 from calib.limits import Limits
-from fingervision.cli._bench_limits import LIMITS
-from fingervision.cli.calibrate import command
+from fingervision.cli.calibrate import LIMITS, command
 from fingervision.domain.errors import FingervisionError
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.light import Light

@@ -6,7 +6,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from fingervision.cli._where_to_measure import where_to_measure
+from fingervision.cli._options import where_to_measure
 from fingervision.domain.errors import DataError
 from fingervision.storage.settings_toml import read_settings, write_settings
 

@@ -85,7 +85,7 @@ def test_a_gap_over_the_input_without_times_is_said_once_for_a_measurement_and_f
     table.write_text("% Eingriff (mm)   Gap (mm)\n" + rows, encoding="utf-8")
     with pytest.raises(OpenQuestionError) as caught:
         call("table", table)
-    assert "--as" not in str(caught.value)
+    assert "--kind" not in str(caught.value)
     printed = call("table", table, "--set", caught.value.questions[0].key)
     assert "measured or simulation table" in printed
     assert json.loads(call("table", table, "--json"))["also"] == "simulation"
