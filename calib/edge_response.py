@@ -7,8 +7,9 @@ chapter 27) gives the probability of the family. A single family with free param
 F(l) = Phi(Phi^-1(l) + d) turns an edge into the same edge displaced by d sigma, so that the smoothness of few families
 decides, and the quality of the fit does not.
 
-The blur is a Gaussian with a disc (defocus) and a wider Gaussian (wings), all integrated over the pixel, and one skew
-(coma), whose side is fixed in the picture while that of a tone curve is fixed to the dark side of each edge.
+The blur is a Gaussian convolved with a disc (defocus) and integrated over the pixel, of which a share is spread further
+by an exponential to either side: the tails of optics, and coma if they are unlike. The side of a tail is fixed in the
+picture, while that of a tone curve is fixed to the dark side of each edge.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +18,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import erfcx, ndtr
 
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.edge_profile import EdgeProfile
@@ -26,12 +27,14 @@ Floats = NDArray[np.float64]
 
 # Levels (shares of full scale) at which the light of a family is tabulated.
 LEVELS = np.linspace(0.0, 1.0, 1025)
-# Radius of the disc and sigma of the wings, in sigmas of the Gaussian, and sigma (pixels) of the disc's own edge: that
-# of a pixel and of the diffraction beside it.
-DISC_RADIUS, WING_SIGMA, DISC_EDGE_PX = 2.0, 1.8, 0.58
-# Prior standard deviations: shares of disc and wings, skew (third moment over the cube of sigma), change of the light
-# of each plateau per pixel (share of the contrast), difference of an edge's ln sigma from the common one, ln sigma.
-U_DISC, U_WING, U_SKEW, U_SLOPE, U_UNLIKE, U_SIGMA = 0.5, 0.2, 0.5, 0.01, 0.03, 1.0
+# Prior standard deviations: ln of the disc's radius over sigma (about 0), share of the light in each tail, ln of the
+# tails' mean length over sigma (about 0), change of the light of each plateau per pixel (share of the contrast),
+# difference of an edge's ln sigma from the common one, ln sigma.
+U_DISC, U_TAIL, U_LENGTH, U_SLOPE, U_UNLIKE, U_SIGMA = 1.0, 0.2, 0.5, 0.01, 0.03, 1.0
+# Radius of the disc over sigma where a fit begins, and width of the edge over sigma with this disc: from a disc the fit
+# finds both defocus and sharp optics, but not the other way round.
+START_DISC = 1.6
+START_WIDENED = (1.0 + 0.25 * START_DISC**2) ** 0.5
 # Prior probability of a linear camera; the other families share the rest. Machine vision cameras are linear, others
 # are not.
 LINEAR_PRIOR = 0.5
@@ -41,12 +44,14 @@ LEAST_PROBABILITY, CERTAIN = 1e-3, 0.99
 REACH_SIGMAS, REACH_EXTRA_PX = 4.0, 3.0
 # Steps of the Levenberg-Marquardt fit, change of the cost below which it has converged, and step of the derivatives.
 MOST_STEPS, CONVERGED, STEP = 25, 0.02, 1e-4
-# Numbers of unknowns: common to all edges (ln sigma, disc, wings, skew), and of each edge (position, both plateaus as
+# Numbers of unknowns: common to all edges (see `FamilyFit`), and of each edge (position, both plateaus as
 # levels, slopes of both, ln of its own sigma over the common one).
-SHARED, OWN = 4, 6
+SHARED, OWN = 5, 6
 
-HERMITE_X, HERMITE_W = np.polynomial.hermite_e.hermegauss(7)
-HERMITE_W = HERMITE_W / HERMITE_W.sum()
+# Gauss-Chebyshev quadrature of the second kind, whose weight is the line spread of a uniform disc: places (radii) and
+# weights. Seven nodes are exact to 1e-4 of the contrast up to a radius of three sigmas.
+_ANGLES = np.arange(1, 8) * np.pi / 8.0
+DISC_AT, DISC_W = np.cos(_ANGLES), 0.25 * np.sin(_ANGLES) ** 2
 ROOT_2PI = float(np.sqrt(2.0 * np.pi))
 
 
@@ -111,7 +116,10 @@ class FamilyFit:
     parameters, covariance : ndarray of float, shapes (k,) and (k, k)
         Parameters of the tone curve, and their covariance with everything else free.
     shared, u_shared : ndarray of float, shape (SHARED,)
-        ln sigma, disc, wings, skew, and their standard uncertainties.
+        ln sigma, ln radius of the disc over sigma, shares of the tails towards larger and towards smaller coordinates,
+        ln length of the tails over sigma; and their standard uncertainties.
+    edges : ndarray of float, shape (SHARED + edges * OWN,)
+        All unknowns but the parameters of the tone curve.
     log_evidence : float
         Logarithm of the evidence, up to a constant.
     misfit : ndarray of float, shape (edges,)
@@ -125,6 +133,7 @@ class FamilyFit:
     covariance: Floats
     shared: Floats
     u_shared: Floats
+    edges: Floats
     log_evidence: float
     misfit: Floats
     rms_level: float
@@ -161,7 +170,12 @@ def fit_families(
         Standard response that a tag of the file states, which becomes a further family; empty without one.
     """
     data = _Data.of(profiles, model_error, scale)
-    return sorted((_fit(family, data) for family in (*FAMILIES, *_tagged(tagged))), key=lambda fit: -fit.log_evidence)
+    fits: list[FamilyFit] = []
+    for family in (*FAMILIES, *_tagged(tagged)):
+        # A family with parameters begins where the best one has ended, because edges and optics are the same.
+        best = max(fits, key=lambda fit: fit.log_evidence, default=None) if family.mean else None
+        fits.append(_fit(family, data, data.start() if best is None else best.edges))
+    return sorted(fits, key=lambda fit: -fit.log_evidence)
 
 
 @cache
@@ -277,7 +291,7 @@ class _Data:
     def start(self) -> Floats:
         own = np.zeros((len(self.ends), OWN))
         own[:, 1:3] = self.ends
-        return np.concatenate([[np.log(self.sigma), 0.0, 0.0, 0.0], own.ravel()])
+        return np.concatenate([[np.log(self.sigma / START_WIDENED), np.log(START_DISC), 0.0, 0.0, 0.0], own.ravel()])
 
 
 def _width(profile: EdgeProfile) -> float:
@@ -287,10 +301,10 @@ def _width(profile: EdgeProfile) -> float:
     return max(profile.contrast / (ROOT_2PI * max(steepest, 1e-9)), 0.5)
 
 
-def _fit(family: Family, data: _Data) -> FamilyFit:
+def _fit(family: Family, data: _Data, start: Floats) -> FamilyFit:
     """Levenberg-Marquardt fit, and Laplace's evidence at its result."""
     k, edges = len(family.mean), len(data.ends)
-    unknowns = np.concatenate([family.mean, data.start()])
+    unknowns = np.concatenate([family.mean, start])
     prior_mean, prior_u = _priors(family, data)
     precision = np.where(np.isfinite(prior_u), prior_u**-2.0, 0.0)
     damping, residual = 1e-2, _residuals(family, data, unknowns[None])[0]
@@ -323,6 +337,7 @@ def _fit(family: Family, data: _Data) -> FamilyFit:
         covariance[:k, :k],
         unknowns[k : k + SHARED],
         np.sqrt(np.diag(covariance)[k : k + SHARED]),
+        unknowns[k:],
         evidence,
         chi / np.maximum(count - OWN, 1).astype(np.float64),
         float(np.sqrt(np.mean((residual * data.u) ** 2))),
@@ -332,8 +347,8 @@ def _fit(family: Family, data: _Data) -> FamilyFit:
 def _priors(family: Family, data: _Data) -> tuple[Floats, Floats]:
     """Means and standard deviations of all unknowns; infinite for the position and the plateaus."""
     own = np.array([np.inf, np.inf, np.inf, U_SLOPE, U_SLOPE, U_UNLIKE])
-    shared_u = np.array([U_SIGMA, U_DISC, U_WING, U_SKEW])
-    mean = np.concatenate([family.mean, [np.log(data.sigma), 0.0, 0.0, 0.0], np.zeros(OWN * len(data.ends))])
+    shared_u = np.array([U_SIGMA, U_DISC, U_TAIL, U_TAIL, U_LENGTH])
+    mean = np.concatenate([family.mean, [np.log(data.sigma), 0.0, 0.0, 0.0, 0.0], np.zeros(OWN * len(data.ends))])
     return mean, np.concatenate([family.u, shared_u, np.tile(own, len(data.ends))])
 
 
@@ -360,11 +375,13 @@ def _jacobian(family: Family, data: _Data, unknowns: Floats, residual: Floats) -
 def _residuals(family: Family, data: _Data, sets: Floats) -> Floats:
     """Measured minus modelled level of every bin, in its standard uncertainties, for each set of unknowns."""
     k, edges = len(family.mean), len(data.ends)
-    shared = sets[:, k : k + SHARED, None]
     own = sets[:, k + SHARED :].reshape(len(sets), edges, OWN)
     at, dark, light, slope_dark, slope_light, unlike = (own[:, :, j][:, data.edge] for j in range(OWN))
-    x = data.away - at
-    step = _step(x, np.exp(shared[:, 0] + unlike), shared[:, 1], shared[:, 2], shared[:, 3] * data.side[data.edge])
+    # The blurred step depends on few unknowns, which most sets of a derivative have in common.
+    blur = np.concatenate((sets[:, k : k + SHARED], own[:, :, 0], own[:, :, 5]), axis=1)
+    _, first, place = np.unique(blur, axis=0, return_index=True, return_inverse=True)
+    step = _step(data.away - at[first], np.exp(unlike[first]), sets[first, k : k + SHARED, None], data.side[data.edge])
+    x, step = data.away - at, step[place.ravel()]
     share = step + slope_dark * np.minimum(x, 0.0) * (1.0 - step) + slope_light * np.maximum(x, 0.0) * step
     out = np.empty_like(x)
     table, before = LEVELS, None
@@ -376,26 +393,30 @@ def _residuals(family: Family, data: _Data, sets: Floats) -> Floats:
     return np.asarray((out - data.level) / data.u)
 
 
-def _step(x: Floats, sigma: Floats, disc: Floats, wing: Floats, skew: Floats) -> Floats:
-    """Edge spread function: Gaussian, disc and wings, integrated over the pixel, with a skew (Edgeworth's term)."""
-    z = x / sigma
-    skewed = -skew / (6.0 * ROOT_2PI) * (z**2 - 1.0) * np.exp(-0.5 * z**2)
-    gauss, wide = _over_pixel(x, sigma), _over_pixel(x, WING_SIGMA * sigma)
-    return np.asarray((1.0 - disc - wing) * gauss + disc * _disc(x, DISC_RADIUS * sigma) + wing * wide + skewed)
+def _step(x: Floats, wider: Floats, shared: Floats, side: Floats) -> Floats:
+    """Edge spread function at the distances x, with the common unknowns; `wider` multiplies sigma."""
+    sigma = wider * np.exp(shared[:, 0])
+    radius = sigma * np.exp(shared[:, 1])
+    own = sum(w * _over_pixel(x - radius * at, sigma) for at, w in zip(DISC_AT, DISC_W, strict=True))
+    # The variance of a disc's line spread is a quarter of its squared radius, that of a pixel's width a twelfth.
+    spread, length = np.sqrt(sigma**2 + 0.25 * radius**2 + 1.0 / 12.0), sigma * np.exp(shared[:, 4])
+    larger, smaller = shared[:, 2], shared[:, 3]
+    lighter, darker = np.where(side > 0.0, larger, smaller), np.where(side > 0.0, smaller, larger)
+    outwards, inwards = _with_tail(x, spread, length), 1.0 - _with_tail(-x, spread, length)
+    return np.asarray((1.0 - larger - smaller) * own + lighter * outwards + darker * inwards)
+
+
+def _with_tail(x: Floats, sigma: Floats, length: Floats) -> Floats:
+    """Step blurred by a Gaussian and by an exponential towards larger x (scaled error function against overflow)."""
+    z = (sigma / length - x / sigma) / np.sqrt(2.0)
+    near = 0.5 * np.exp(-0.5 * (x / sigma) ** 2) * erfcx(np.maximum(z, -5.0))
+    far = np.exp(np.minimum(0.5 * (sigma / length) ** 2 - x / length, 50.0))
+    return np.asarray(ndtr(x / sigma) - np.where(z > -5.0, near, far))
 
 
 def _over_pixel(x: Floats, sigma: Floats) -> Floats:
-    """Normal distribution integrated over a pixel about x."""
-    ends = [
-        each * ndtr(each / sigma) + sigma / ROOT_2PI * np.exp(-0.5 * (each / sigma) ** 2) for each in (x + 0.5, x - 0.5)
-    ]
-    return np.asarray(ends[0] - ends[1])
-
-
-def _disc(x: Floats, radius: Floats) -> Floats:
-    """Edge spread of a uniform disc, smoothed by the pixel (Gauss-Hermite quadrature)."""
-    total = np.zeros_like(x)
-    for node, weight in zip(HERMITE_X, HERMITE_W, strict=True):
-        u = np.clip((x + node * DISC_EDGE_PX) / radius, -1.0, 1.0)
-        total += weight * (0.5 + (u * np.sqrt(1.0 - u * u) + np.arcsin(u)) / np.pi)
-    return total
+    """Normal distribution integrated over a pixel about x: Edgeworth's series to the box's fourth cumulant, -1/120."""
+    variance = sigma**2 + 1.0 / 12.0
+    z = x / np.sqrt(variance)
+    square = z * z
+    return np.asarray(ndtr(z) + z * (square - 3.0) * np.exp(-0.5 * square) / (2880.0 * ROOT_2PI * variance**2))

@@ -87,22 +87,25 @@ class ResponseEstimate:
 
 @dataclass(frozen=True, slots=True)
 class PointSpread:
-    """Spread of a point of light: a Gaussian, a disc of twice its sigma and a Gaussian of 1.8 times its sigma.
+    """Spread of a point of light: a Gaussian convolved with a disc, and exponential tails to either side.
 
     Parameters
     ----------
     sigma_px : CameraQuantity
         Standard deviation of the Gaussian, without the width of the pixel (pixels).
-    disc_share, wing_share : float
-        Share of the light in the disc (defocus) and in the wider Gaussian; they may be slightly negative.
-    skew : float
-        Third moment (coma) relative to the cube of sigma, positive towards larger coordinates in the picture.
+    disc_radius_px : float
+        Radius of the disc (defocus).
+    tail_shares : (float, float)
+        Shares of the light in the tails towards larger and towards smaller coordinates in the picture, which are unlike
+        for coma; they may be slightly negative.
+    tail_px : float
+        Mean length of the tails.
     """
 
     sigma_px: CameraQuantity
-    disc_share: float = 0.0
-    wing_share: float = 0.0
-    skew: float = 0.0
+    disc_radius_px: float = 0.0
+    tail_shares: tuple[float, float] = (0.0, 0.0)
+    tail_px: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

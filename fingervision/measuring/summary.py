@@ -159,9 +159,9 @@ def _camera(series: GapSeries) -> dict[str, Any]:
         if spread is None
         else {
             **quantity(spread.sigma_px, "px"),
-            "disc_share": spread.disc_share,
-            "wing_share": spread.wing_share,
-            "skew": spread.skew,
+            "disc_radius_px": spread.disc_radius_px,
+            "tail_shares": list(spread.tail_shares),
+            "tail_px": spread.tail_px,
         },
         "noise": unknown
         if noise is None

@@ -26,9 +26,8 @@ MOST_MISFIT = 1.3
 # Overshoot of an edge (share of its contrast) above which the camera sharpens: sharpening after the tone curve makes
 # the profile even in the levels, and so imitates another response at a perfect fit.
 MOST_OVERSHOOT = 0.03
-# Negative share of the point spread's wings from which the camera sharpens: no optics takes light away.
-# A skewed point spread (coma) has such a share as well, since its long side is no Gaussian.
-NEGATIVE_WING, COMA = 0.08, 0.15
+# Negative share of the point spread's tails from which the camera sharpens: no optics takes light away.
+NEGATIVE_TAILS = 0.08
 # Least contrast of a flank (share of full scale) within which a curve can be seen, and levels beyond which it is
 # clipped.
 LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
@@ -41,7 +40,7 @@ NO_FLANKS = (
     f"unclipped and with enough contrast: u_shift_px contains another usual response. Lower the exposure, or {REMEDY}."
 )
 SHARPENED = (
-    "The camera sharpens its pictures (its point spread has negative wings, {share:.0%} of the light), which hides its "
+    "The camera sharpens its pictures (its point spread has negative tails, {share:.0%} of the light), which hides its "
     "tone curve: nothing is corrected, and u_shift_px contains a usual tone curve. Switch sharpening off, or "
     f"{REMEDY}."
 )
@@ -92,9 +91,9 @@ def learnt_from_profiles(profiles: list[EdgeProfile], prior: CameraModel, coding
     if misfit > MOST_MISFIT:
         return _not_learnt(prior, MISFIT.format(misfit=misfit), 1.0)
     best = fits[0]
-    wing, u_wing = float(best.shared[2]), float(best.u_shared[2])
-    if wing < -max(NEGATIVE_WING, 2.0 * u_wing) and abs(float(best.shared[3])) < COMA:
-        return _not_learnt(prior, SHARPENED.format(share=-wing), 1.0)
+    tails, u_tails = float(best.shared[2:4].sum()), float(np.hypot(*best.u_shared[2:4]))
+    if tails < -max(NEGATIVE_TAILS, 2.0 * u_tails):
+        return _not_learnt(prior, SHARPENED.format(share=-tails), 1.0)
     camera = replace(
         prior,
         point_spread=_point_spread(best),
@@ -140,9 +139,9 @@ def _response(fits: Sequence[FamilyFit], coding: Coding) -> ResponseEstimate:
 
 
 def _point_spread(fit: FamilyFit) -> PointSpread:
-    sigma = float(np.exp(fit.shared[0]))
-    disc, wing, skew = (float(each) for each in fit.shared[1:])
-    return PointSpread(CameraQuantity(sigma, sigma * float(fit.u_shared[0]), Origin.LEARNT), disc, wing, skew)
+    sigma, disc, length = (float(np.exp(fit.shared[j])) for j in (0, 1, 4))
+    known = CameraQuantity(sigma, sigma * float(fit.u_shared[0]), Origin.LEARNT)
+    return PointSpread(known, sigma * disc, (float(fit.shared[2]), float(fit.shared[3])), sigma * length)
 
 
 def _not_learnt(prior: CameraModel, words: str, weight: float) -> CameraModel:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
+from fingervision.domain.camera import Origin
 from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
@@ -239,8 +240,11 @@ def _edges_and_gap(
     def displaced_px(found: EdgePoints) -> tuple[float, float]:
         return coded.flanks_displaced_px(upright, found, fingers.orientation, light, top)
 
+    may_be_sharpened = settings.camera.sharpening.origin is Origin.ASSUMED
     with suppress(np.linalg.LinAlgError):  # no model describes the structure beside the edges
-        edges = with_profile(upright, edges, light, top, settings.is_outline, displaced_px)
+        edges = with_profile(
+            upright, edges, light, top, settings.is_outline, displaced_px, may_be_sharpened=may_be_sharpened
+        )
     if edges.beside == STRIP:
         return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)

@@ -85,6 +85,8 @@ def with_profile(
     top_level: int,
     is_outline: bool = False,
     displaced_px: Displacement = not_displaced,
+    *,
+    may_be_sharpened: bool = True,
 ) -> EdgePoints:
     """Return the edge points moved to the finger's own edge, if a structure beside it displaced the fitted step.
 
@@ -104,6 +106,9 @@ def with_profile(
     displaced_px : callable
         Standard uncertainty of both flanks' positions by a codec (pixels), from the edges; called only where a width
         is in question.
+    may_be_sharpened : bool
+        Whether the camera may sharpen its pictures; not if it is known from the recording, because the profile of a
+        defocused edge resembles that of a sharpened one.
     """
     flank, tip = edges.blur_px[:, 0].max(), edges.blur_px[:, 1].min()
     is_unlike_tip = flank**2 > (1.0 + WIDER) * (tip**2 + PIXEL_VARIANCE) or are_broader_together(edges, displaced_px)
@@ -118,7 +123,8 @@ def with_profile(
         return _without_profiles(edges, displaced_px)
     if any(p.light.max() > light[top_level] - CUT_OFF_SIGMAS * edges.noise or p.light.min() <= 0.0 for p in inner if p):
         return edges  # the models do not describe a flank that is clipped at the end of the scale
-    if is_curved(light, top_level) and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
+    is_sharp = may_be_sharpened and is_curved(light, top_level)
+    if is_sharp and (sharp := _sharpened(upright, edges, light, top_level, room)) is not None:
         return sharp
     blur = [float(np.hypot(edges.blur_px[k, 0], np.sqrt(PIXEL_VARIANCE))) for k in range(2)]
     # Lines along the picture's border do not cross a flank.

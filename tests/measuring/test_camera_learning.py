@@ -43,6 +43,17 @@ def test_srgb_is_recognised_and_measured_through(recording: Recording) -> None:
     assert np.all(np.abs(after) < 3.0 * u)
 
 
+@pytest.mark.parametrize("optics", ["coma", "defocus"])
+def test_unsharp_optics_hide_no_tone_curve(recording: Recording, optics: str) -> None:
+    film = CLASSES[f"srgb-{optics}"](recording)
+    camera = camera_of(list(film), SETTINGS, SCALE)
+    found = [measure_frame(frame, replace(SETTINGS, camera=camera)) for frame in film]
+    wrong = np.array([m.gap_px - gap for m, gap in zip(found, recording.gap_px, strict=True)])
+    assert np.abs(wrong.mean()) < 0.1  # 0.15 and 0.5 px with one skew, and a share of a disc
+    assert np.all(np.abs(wrong) < 3.0 * np.array([np.hypot(m.u_gap_px, m.u_picture_px) for m in found]))
+    assert "sharpening" not in {m.beside for m in found}  # the profile of a disc resembles a sharpened one
+
+
 def test_a_linear_camera_stays_linear_to_the_digit(recording: Recording) -> None:
     film = CLASSES["linear"](recording)
     camera = camera_of(list(film), SETTINGS, SCALE)
