@@ -86,6 +86,7 @@ class GapSeries:
     _u_random_mm: array[float] = field(default_factory=lambda: array("d"))
     _u_gap_px: array[float] = field(default_factory=lambda: array("d"))
     _response_px: array[float] = field(default_factory=lambda: array("d"))
+    _contrast: array[float] = field(default_factory=lambda: array("d"))
     _bad_frame: array[int] = field(default_factory=lambda: array("q"))
     _bad_time_s: array[float] = field(default_factory=lambda: array("d"))
 
@@ -127,6 +128,9 @@ class GapSeries:
             self._u_random_mm.append(row.u_random_mm)
             self._u_gap_px.append(row.u_gap_px)
             self._response_px.append(abs(getattr(result.outcome, "u_response_px", 0.0)))
+            if isinstance(result.outcome, GapMeasurement):
+                edges = (result.outcome.left, result.outcome.right)
+                self._contrast.append(0.5 * sum(abs(edge.contrast) for edge in edges))
             self.has_budget = row.u_gap_mm is not None
             self._u_mm.append(row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm)
 
@@ -175,6 +179,11 @@ class GapSeries:
     def response_px(self) -> NDArray[np.float64]:
         """Standard uncertainty of each gap (px) due to the camera's response; 0 if the response is known."""
         return np.array(self._response_px)
+
+    @property
+    def contrast(self) -> NDArray[np.float64]:
+        """Mean contrast of each gap's two edges (light)."""
+        return np.array(self._contrast)
 
     def times_s(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Times of the frames with, and of those without, a gap; None if frames have no times."""

@@ -17,6 +17,7 @@ from fingervision.domain.camera import CameraQuantity, Origin
 from fingervision.domain.errors import InputFileError
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
+from fingervision.measuring.light_change import light_change
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.series import GapSeries
 
@@ -131,6 +132,7 @@ def summarise(
             *_about_unseen(description, series),
             *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
             *_about_fingers(series),
+            *_about_light(series),
             *about_edges(series),
             *([NO_LIMITS.format(name=scale_file or "given")] if _states_no_limits(scale) else []),
             *description.notes,
@@ -209,6 +211,20 @@ def _about_fingers(series: GapSeries) -> list[str]:
     return [
         f"The first frames disagree about the brightness of the fingers: {counts} of them. All frames were measured "
         f"with {taken} fingers: look at frames of both kinds with --steps, and state --fingers dark or --fingers light."
+    ]
+
+
+def _about_light(series: GapSeries) -> list[str]:
+    """Warning if the contrast changes abruptly and for good, unless nothing depends on the light."""
+    change = light_change(series.contrast)
+    if change is None or series.camera.response.is_known:
+        return []
+    first, frame, last = (int(series.frame_numbers()[0][k]) for k in (0, change.at, -1))
+    return [
+        f"From frame {frame} on, the contrast of the edges is {change.ratio:.2f} times what it was before, as after a "
+        "change of exposure, gain or picture profile. The camera is judged by the first frames, and u_shift_px does "
+        f"not include that another response may hold afterwards: measure the parts by themselves (--frames "
+        f"{first}:{frame - 1} and --frames {frame}:{last}), and record with these settings fixed."
     ]
 
 
