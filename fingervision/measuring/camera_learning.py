@@ -10,6 +10,7 @@ from fingervision.domain.camera import CameraModel
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.measuring.scale import Scale
+from fingervision.measuring.temporal_filter import temporal_lag
 from fingervision.vision.flank_profiles import Seen
 from fingervision.vision.grey import to_grey, top_level
 from fingervision.vision.learnt_camera import learnt_camera
@@ -75,17 +76,22 @@ def learnt_first(
 def camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) -> CameraModel:
     """Camera as frames of one recording show it; the camera before if too few of them have a gap."""
     seen: list[Seen] = []
+    numbers: list[int] = []
     coding, top = Coding.LOSSLESS, 0
     for frame in frames:
         outcome, fingers, edges = look_closely(frame, settings)
         if isinstance(outcome, GapMeasurement) and fingers is not None and edges is not None:
             grey = region_of_interest(to_grey(frame.pixels), settings.region)
             seen.append((fingers.orientation.view(grey), edges))
+            numbers.append(frame.index)
             coding, top = frame.coding, max(top, top_level(grey, settings.bits))
     before = settings.camera
     if len(seen) < FEWEST:
         return before
     camera = learnt_camera(seen, before, top, coding)
+    if coding is not Coding.INTERFRAME:  # such a codec repeats the noise of the picture before
+        lag = temporal_lag([(number, *each) for number, each in zip(numbers, seen, strict=True)])
+        camera = replace(camera, lag=lag)
     return replace(camera, response=before.response) if _has_edge_bias(scale) else camera
 
 

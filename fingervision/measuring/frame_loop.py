@@ -25,6 +25,7 @@ from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.task import Task
+from fingervision.measuring.temporal_filter import with_lag
 from fingervision.storage.beside import recorded_camera
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.lost_frames import lost_frames
@@ -276,7 +277,7 @@ def _outcomes(
         first, series.camera = learnt_first(
             coded(frames, how.description.coding), how.settings, how.row_maker.scale, is_stopped
         )
-        yield from in_sequence(judged(first))
+        yield from with_lag(in_sequence(judged(first)), series.camera.lag)
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:

@@ -195,6 +195,16 @@ def defocused(recording: Recording, curve: Curve) -> Film:
     return lossless(replace(recording, light=blurred), curve)
 
 
+def noise_reduced(recording: Recording, curve: Curve, share: float) -> Film:
+    """Recursive noise reduction over time: each picture has this share of the one before; the fingers were at rest."""
+    rng = np.random.default_rng([recording.seed, 11])
+    kept, pictures = curve(exposed(recording.light[0], rng)), []
+    for light in (*[recording.light[0]] * 20, *recording.light):
+        kept = share * kept + (1.0 - share) * curve(exposed(light, rng))
+        pictures.append(stored(kept))
+    return Film(tuple(pictures[20:]), Coding.LOSSLESS)
+
+
 CLASSES: dict[str, Callable[[Recording], Film]] = {
     **{name: partial(lossless, curve=curve) for name, curve in CURVES.items()},
     "linear-coma": partial(coma, curve=CURVES["linear"]),
@@ -206,6 +216,7 @@ CLASSES: dict[str, Callable[[Recording], Film]] = {
     "bt709-h264": partial(h264, curve=bt709),
     "linear-jpeg": partial(jpeg, curve=CURVES["linear"]),
     "srgb-jpeg": partial(jpeg, curve=srgb),
+    "linear-noise-reduced": partial(noise_reduced, curve=CURVES["linear"], share=0.8),
     "phone": partial(jpeg, curve=s_curve, amount=0.5),
 }
 SURFACES = {
