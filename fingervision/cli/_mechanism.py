@@ -20,12 +20,12 @@ from fingervision.cli._model_sweep import sweep_mechanism
 from fingervision.cli._model_uncertainty import write_uncertainty
 from fingervision.domain.errors import ArgumentError, FingervisionError, InstallationError, OutputError, UsageError
 from fingervision.models.elastic_mechanism import MechanismState
+from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.models.mechanism_uncertainty import mechanism_uncertainty
+from fingervision.models.uncertainty import mechanism_uncertainty
 from fingervision.storage.mechanism_toml import read_drawing
 from fingervision.storage.simulation_table import POSE
 

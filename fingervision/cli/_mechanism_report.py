@@ -7,8 +7,7 @@ from math import copysign, isfinite
 import click
 
 from fingervision.models.elastic_mechanism import MechanismState
-from fingervision.models.endurance import Endurance, endurance
-from fingervision.models.gripper_figures import unit_of
+from fingervision.models.gripper_figures import Endurance, endurance, unit_of
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import MechanismModel
 

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from fingervision.cli._body_picture import draw_body, extent_mm, framed
 from fingervision.domain.response import Response
-from fingervision.models import published_table
+from fingervision.models import reference_mesh
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.triangulate import PlaneMesh
 
 Array = NDArray[np.float64]
 
 _PUBLISHED = (
-    ("paper: SimMechanics", published_table.SIMMECHANICS_MM, "s"),
-    ("paper: Comsol", published_table.COMSOL_MM, "^"),
-    ("paper: experiment", published_table.EXPERIMENT_MM, "o"),
+    ("paper: SimMechanics", reference_mesh.SIMMECHANICS_MM, "s"),
+    ("paper: Comsol", reference_mesh.COMSOL_MM, "^"),
+    ("paper: experiment", reference_mesh.EXPERIMENT_MM, "o"),
 )
 
 
@@ -77,7 +77,7 @@ def draw_comparison(
     colours = mpl.colormaps["tab10"]
     kinds = list(answers)
     if with_published:
-        at, reference = published_table.INPUT_MM, published_table.EXPERIMENT_MM
+        at, reference = reference_mesh.INPUT_MM, reference_mesh.EXPERIMENT_MM
         title = "gap minus experiment / mm"
     else:
         at, reference = inputs, answers[kinds[0]].gap_mm

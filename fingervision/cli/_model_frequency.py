@@ -12,9 +12,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fingervision.domain.errors import UsageError
-from fingervision.models.damping_text import parse_damping
-from fingervision.models.frequency_response import FrequencyResponse, frequency_response, resolved_frequencies_hz
-from fingervision.models.modal_model import GAP, FreeModes, ModalModel, described
+from fingervision.models.damping import parse_damping
+from fingervision.models.modal_model import (
+    GAP,
+    FreeModes,
+    FrequencyResponse,
+    ModalModel,
+    described,
+    frequency_response,
+    resolved_frequencies_hz,
+)
 from fingervision.models.motion_in_time import MODES
 
 _MOST_MODES = 60

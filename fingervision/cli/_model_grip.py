@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import Part, first_grip_mm, gripped
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_loads import GrippedPair, PairGrip
-from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.mechanism_figures import GrippedPair, PairGrip
 
 _COLUMNS = ("kind", "input_mm", "gap_mm", "held_width_mm", "grip_n", "force_n", "stress_mpa")
 _ROWS = 61

@@ -15,11 +15,10 @@ from scipy.interpolate import PchipInterpolator
 from fingervision.cli._model_frequency import Band, answer_frequencies, main_column, moving, parse_band
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import UsageError
-from fingervision.models.damping_text import parse_damping
+from fingervision.models.damping import parse_damping
 from fingervision.models.elastic_mechanism import ElasticMechanism
 from fingervision.models.gripper_model import DrawnGripper
-from fingervision.models.modal_model import GAP, ModalModel
-from fingervision.models.modal_response import Motion, modal_motion
+from fingervision.models.modal_model import GAP, ModalModel, Motion, modal_motion
 from fingervision.models.mode_shapes import ModesWanted, mode_shapes, parse_modes
 from fingervision.models.motion_in_time import MODES, about_equilibria, check_small_vibration, gripper_motion
 from fingervision.storage.simulation_table import write_motion

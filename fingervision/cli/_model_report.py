@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import ModelFigures
-from fingervision.models.gripper_figures import life_between, unit_of
+from fingervision.models.gripper_figures import input_at_yield_mm, life_between, unit_of
 from fingervision.models.kinds import by_trust, small_displacements_alone
 from fingervision.models.notch import notches_of
 from fingervision.models.physics import Physics
-from fingervision.models.yield_limit import input_at_yield_mm
 
 
 def write_table(rows: Mapping[str, Mapping[str, Any]], path: Path) -> None:

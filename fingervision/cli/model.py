@@ -159,10 +159,9 @@ def command(
     from fingervision.cli._model_motion import motion_asked, move
     from fingervision.cli._model_report import print_table, say_what_limits, write_table
     from fingervision.domain.errors import FingervisionError
-    from fingervision.models.agreement import disagreements
     from fingervision.models.gripper_figures import gripper_figures
     from fingervision.models.hinge_correction import HingeTheory
-    from fingervision.models.kinds import build_model, kinds, small_displacements_alone
+    from fingervision.models.kinds import build_model, disagreements, kinds, small_displacements_alone
     from fingervision.models.physics import LINEAR, Physics
     from fingervision.storage.gripper_toml import read_gripper
     from fingervision.storage.mechanism_toml import is_mechanism
@@ -191,7 +190,7 @@ def command(
         finish_in(out, gripper_toml, _SWEPT, began_ns)
         return
     if uncertain := any(u > 0.0 for u in gripper.uncertainties.values()):
-        from fingervision.models.gripper_uncertainty import check_uncertainties
+        from fingervision.models.uncertainty import check_uncertainties
 
         check_uncertainties(gripper)
     wanted = kinds() if kind == "all" else (kind,)
@@ -239,7 +238,7 @@ def command(
     print_table(rows, as_json=as_json)
     if uncertain:
         from fingervision.cli._model_uncertainty import write_uncertainty
-        from fingervision.models.gripper_uncertainty import gripper_uncertainty
+        from fingervision.models.uncertainty import gripper_uncertainty
 
         spread = gripper_uncertainty(gripper, inputs, HingeTheory(hinge), physics)
         write_uncertainty(spread, rows, gripper_toml.stem, out, as_json=as_json)

@@ -8,12 +8,12 @@ static results do not depend on damping.
 """
 
 from dataclasses import dataclass
-from math import atan, cos, exp, log, pi, sinh
+from math import atan, cos, exp, isfinite, log, pi, sinh
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import ModelError
+from fingervision.domain.errors import ModelError, UsageError
 
 Array = NDArray[np.float64]
 
@@ -140,3 +140,47 @@ def checked(ratios: Array) -> Array:
 
 
 Damping = ModalDamping | LossFactor | RayleighDamping | PaperDamping
+
+
+# Parse the short text of a damping law that is given to `model --damping`.
+
+FORMS = "modal:0.025, loss:0.05, rayleigh:0.025:45:360 (ratio and two frequencies in Hz) or paper[:0.5]"
+_LIMIT = 0.3
+
+
+def parse_damping(text: str) -> Damping:
+    """Parse a damping law.
+
+    Parameters
+    ----------
+    text : str
+        `modal:RATIO`, `loss:FACTOR` (twice the ratio), `rayleigh:RATIO:HZ:HZ`, `paper` or `paper:GAMMA`: equation (4)
+        of Hricko & Havlik (2015) relative to the lowest vibrating mode.
+
+    Raises
+    ------
+    UsageError
+        If the text has none of these forms, or its damping ratio is not possible for a solid.
+    """
+    law, *parts = text.split(":")
+    try:
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        numbers = [float("nan")]
+    counts = {"modal": (1,), "loss": (1,), "rayleigh": (3,), "paper": (0, 1)}
+    if len(numbers) not in counts.get(law, ()) or not all(isfinite(x) and x > 0.0 for x in numbers):
+        raise UsageError(f"--damping must be {FORMS}, with positive numbers, but is {text}.")
+    if law == "paper":
+        return PaperDamping(None, *numbers)
+    ratio = 0.5 * numbers[0] if law == "loss" else numbers[0]
+    if ratio >= _LIMIT:
+        raise UsageError(
+            f"--damping must give a damping ratio below {_LIMIT:g}, which no solid exceeds, but {text} gives {ratio:g}."
+        )
+    if law == "modal":
+        return ModalDamping(ratio)
+    if law == "loss":
+        return LossFactor(numbers[0])
+    if not numbers[1] < numbers[2]:
+        raise UsageError(f"--damping rayleigh must have two frequencies in Hz, the lower one first, but is {text}.")
+    return RayleighDamping(ratio, 2.0 * pi * numbers[1], 2.0 * pi * numbers[2])

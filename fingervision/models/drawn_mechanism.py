@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError, UsageError
 from fingervision.domain.response import Response
+from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_figures import MechanismModel
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.place_answers import PlaceAnswers
 
 Array = NDArray[np.float64]

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from fingervision.domain.gripper import PointMm
 from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_bodies import BodyPose
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, MechanismEquilibrium
 from fingervision.models.modal_model import FreeModes, ModalModel, Observable
-from fingervision.models.rigid_motion import BodyPose
 
 Array = NDArray[np.float64]
 

@@ -8,21 +8,277 @@ that the slope equals the published slope of the Comsol model; the agreement of 
 validation.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
+from math import nan
 
-from fingervision.domain.gripper import Gripper
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, identity
+
+from fingervision.domain.errors import ModelError
+from fingervision.domain.gripper import Gripper, PointMm
 from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStress
+from fingervision.models.flexure_span import used_in_plate
 from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.gripper_model import DrawnGripper, ModelErrors
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.mechanism import Mechanism, check_mechanism
+from fingervision.models.mechanism_bodies import BodyPose, LinkBody, bodies_of, plate_poses
+from fingervision.models.mechanism_equilibrium import DrivenMechanism
+from fingervision.models.mechanism_faces import (
+    ContactPair,
+    contact_pair,
+    driven_components,
+    mean_weights,
+    moves_in_the_mean,
+    per_input_of,
+    supports_of,
+)
 from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, OutOfPlane, out_of_plane
 from fingervision.models.physics import LINEAR, Physics
+from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.reference_mesh import mesh_of
-from fingervision.models.triangulate import PlaneMesh
-from fingervision.models.width_effect import force_uncertainty
+from fingervision.models.triangulate import PlaneMesh, triangulate
+from fingervision.models.width_effect import ConstrainedZone, force_uncertainty
+
+# A planar mechanism by finite elements: any topology, small or large displacements, stress and natural modes.
+
+Array = NDArray[np.float64]
+
+_ACROSS, _BODY = 4.0, 0.025
+"""Triangles across thin parts, and edge length over the body's size: as for the published sample."""
+_STRESS_ERROR = 0.01
+"""Relative error of the stress; meshes twice and three times as fine differ by 0.3 %
+(`tests/benchmarks/models_held_out.py`)."""
+_BESIDE_CORNER = 0.5
+"""Distance from a sharp corner, in thicknesses of the thinnest flexure, within which stress is left out, because it
+depends on the mesh there."""
+
+
+class MechanismPlate(ElasticMechanism):
+    """Finite-element model of a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    width_effect : bool
+        Whether the restraint of the flexures by the plate's width is included; plane stress if False.
+    refine : float
+        Factor by which the edge lengths are divided.
+    mesh : PlaneMesh or None
+        Triangles of the drawing; None makes them.
+
+    Raises
+    ------
+    FingervisionError
+        If the drawing is not a valid mechanism, or a face contains no nodes of the outline.
+    """
+
+    kind = "finite_element"
+
+    def __init__(
+        self, mechanism: Mechanism, *, width_effect: bool = True, refine: float = 1.0, mesh: PlaneMesh | None = None
+    ) -> None:
+        super().__init__(mechanism)
+        self._width_effect = width_effect
+        region = mechanism.region
+        check_mechanism(mechanism, region)
+        self._size_mm = region.size_mm
+        self.mesh: PlaneMesh = mesh or triangulate(region, _ACROSS * refine, _BODY * self._size_mm / refine)
+        zones = self._hold_back()
+        middles = self.mesh.nodes_mm[:, self.mesh.triangles[:3]].mean(axis=1)
+        inside = [zone.holds(middles) for zone in zones] or [np.ones(middles.shape[1], dtype=bool)]
+        self._in_flexure = np.any(inside, axis=0) & ~self._beside_sharp_corners(region, middles)
+        corners = [] if mechanism.flexures else sharp_corners_mm(region)
+        self.unstated_stress_at_mm = (float(corners[0][0]), float(corners[0][1])) if corners else None
+        self._support()
+        if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures) and not self._wanders():
+            # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
+            moved, whole = self.driven.unit_displacement, 0.5 * self.driven.input_stiffness_n_mm
+            flexures = (f if f.is_notch else used_in_plate(f, self.plate, moved, whole) for f in mechanism.flexures)
+            self.mechanism = replace(mechanism, flexures=tuple(flexures))
+            del self.driven
+            self._hold_back()
+
+    def _hold_back(self) -> tuple[ConstrainedZone, ...]:
+        """Make the plate with its flexures stiffened by the restraint of its width; equal halves are one plate."""
+        mechanism = self.mechanism
+        zones = tuple(flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures)
+        used, thick_mm = zones if self._width_effect else (), mechanism.halves * mechanism.plate_mm
+        self.plate = PlaneStressPlate(self.mesh, mechanism.material, thick_mm, used)
+        return zones
+
+    def _beside_sharp_corners(self, region: PlanarRegion, points: Array) -> NDArray[np.bool_]:
+        """Points within half a thickness of a sharp re-entrant corner, where the elastic stress is singular."""
+        flexures = self.mechanism.flexures
+        near_mm = _BESIDE_CORNER * min((flexure.thickness_mm for flexure in flexures), default=0.0)
+        beside = np.zeros(points.shape[1], dtype=bool)
+        for corner in sharp_corners_mm(region):
+            beside |= np.hypot(points[0] - corner[0], points[1] - corner[1]) < near_mm
+        return beside
+
+    def _support(self) -> None:
+        mechanism, plate = self.mechanism, self.plate
+        supports = supports_of(plate, mechanism, self._size_mm)
+        dofs = {"x": plate.x_dofs, "y": plate.y_dofs}
+        held = [dofs[component][nodes] for nodes in supports.fixed for component in "xy"]
+        held += [dofs[component][nodes] for nodes, component in supports.slides]
+        self._by_drive = np.zeros((plate.unknowns, len(mechanism.drives)))
+        motions = identity(plate.unknowns, format="csc")
+        for column, (drive, nodes) in zip(self._by_drive.T, zip(mechanism.drives, supports.driven, strict=True),
+                                          strict=True):  # fmt: skip
+            driven = driven_components(drive)
+            if moves_in_the_mean(plate, nodes, drive):
+                weights = mean_weights(plate, nodes)
+                wanted = [(c, weights, drive.direction["xy".index(c)]) for c in driven]
+                if drive.turns == "held":
+                    across = "yx"["xy".index(driven[0])]
+                    along = plate.nodes_mm["xy".index(driven[0]), nodes]
+                    wanted.append((across, weights * (along - weights @ along), 0.0))
+                motions = motions.tolil()
+                for component, row, value in wanted:
+                    # The drive prescribes a weighted sum, through the unknown with the largest weight that can move.
+                    own = dofs[component][nodes]
+                    chief = int(np.argmax(np.where(np.isin(own, np.concatenate([*held, [-1]])), 0.0, np.abs(row))))
+                    column[own[chief]] = value / row[chief]
+                    motions[own[chief], own] = -row / row[chief]
+                    held.append(own[[chief]])
+                continue
+            for component, share in zip("xy", drive.direction, strict=True):
+                if component in driven:
+                    column[dofs[component][nodes]] = share
+                    held.append(dofs[component][nodes])
+        self._by_input = self._by_drive @ per_input_of(mechanism)
+        free = np.setdiff1d(np.arange(plate.unknowns), np.concatenate(held))
+        self._motions = csr_matrix(motions.tocsc()[:, free])
+
+    @cached_property
+    def driven(self) -> DrivenMechanism:
+        """The mechanism as a system whose equilibria can be computed.
+
+        Raises
+        ------
+        DataError, ModelError
+            If a contact's face is not on the outline, or the supports allow the mechanism to move freely.
+        """
+        if self._wanders():
+            raise ModelError(f"{self.mechanism.name} must be held by its fixed faces, but can move freely.")
+        plate = self.plate
+        return DrivenMechanism(
+            self.mechanism.name, plate.internal_force_n, plate.nodal_force_n, self._motions, self._by_drive,
+            per_input_of(self.mechanism), lambda: plate.mass_t,
+            tuple(partial(pair.gaps_mm, plate) for pair in self._pairs),
+        )  # fmt: skip
+
+    def _wanders(self) -> bool:
+        """Whether the supports allow a rigid motion of the whole mechanism."""
+        x, y = self.plate.nodes_mm
+        whole = np.zeros((3, self.plate.unknowns))
+        whole[0, self.plate.x_dofs], whole[1, self.plate.y_dofs] = 1.0, 1.0
+        whole[2, self.plate.x_dofs], whole[2, self.plate.y_dofs] = -(y - y.mean()), x - x.mean()
+        held = np.flatnonzero(np.diff(self._motions.indptr) == 0)
+        return bool(np.linalg.matrix_rank(whole[:, held] / np.abs(whole).max(axis=1)[:, None], tol=1e-6) < 3)
+
+    @cached_property
+    def _pairs(self) -> tuple[ContactPair, ...]:
+        mechanism = self.mechanism
+        return tuple(contact_pair(self.plate, contact, mechanism, self._size_mm) for contact in mechanism.contacts)
+
+    @property
+    def contact_points_mm(self) -> tuple[Array, ...]:
+        """Nodes of every contact's face, shape (2, k) each."""
+        return tuple(self.plate.nodes_mm[:, pair.nodes] for pair in self._pairs)
+
+    def vibrating(self, count: int) -> DrivenMechanism:
+        """Return the same system as `driven`, which has all masses."""
+        del count
+        return self.driven
+
+    @cached_property
+    def swaying(self) -> "MechanismPlate":
+        """The half of a mirrored drawing whose other half moves the same way sideways."""
+        return MechanismPlate(self.mechanism.swaying, width_effect=self._width_effect, mesh=self.mesh)
+
+    @property
+    def unit_displacement_mm(self) -> Array:
+        """Small displacements per 1 mm of input."""
+        return self.driven.unit_displacement
+
+    @property
+    def force_error(self) -> float:
+        """Relative error of the force, from the mesh and the width effect."""
+        return 0.005 + self.mechanism.width_error
+
+    @property
+    def stress_error(self) -> float:
+        """Relative error of the stress in the flexures, from the mesh."""
+        return _STRESS_ERROR
+
+    @cached_property
+    def bodies(self) -> tuple[LinkBody, ...]:
+        """The bodies that the flexures join."""
+        return bodies_of(self.mechanism)
+
+    def drawn_poses(self, moved: Array, *, large: bool) -> Mapping[str, BodyPose]:
+        """Poses of the drawn bodies."""
+        return plate_poses(self.plate, self.bodies, moved, large=large)
+
+    def motion_mm(self, moved: Array, point: PointMm, *, large: bool) -> Array:
+        """Displacement of the point of the finite element in which it lies; linear in the nodes' displacements."""
+        del large
+        return np.asarray(self._rows_at(point) @ moved)
+
+    def _rows_at(self, point: PointMm) -> Array:
+        if point not in self._rows:
+            self._rows[point] = self.plate.rows_at(point)
+        return self._rows[point]
+
+    @cached_property
+    def _rows(self) -> dict[PointMm, Array]:
+        return {}
+
+    def pulled(self, direction: PointMm, system: DrivenMechanism) -> Array:
+        """Displacements of a rigid translation."""
+        moved = np.zeros(system.unknowns)
+        moved[self.plate.x_dofs], moved[self.plate.y_dofs] = direction
+        return moved
+
+    def peak_stress(self, moved: Array, *, large: bool = False) -> LargestStress:
+        """Largest von Mises stress in the flexures at given displacements.
+
+        It is not a number in a drawing without flexures that has a re-entrant corner without a radius
+        (`unstated_stress_at_mm`): the stress has no limit there.
+        """
+        if self.unstated_stress_at_mm is not None:
+            return LargestStress(nan, self.unstated_stress_at_mm)
+        stress = np.where(self._in_flexure, self.plate.von_mises_mpa(moved, large=large), 0.0)
+        place = np.unravel_index(np.argmax(stress), stress.shape)
+        x, y = self.plate.nodes_mm[:, self.plate.corner_triangles[place]]
+        return LargestStress(float(stress[place]), (float(x), float(y)))
+
+    @cached_property
+    def probe_rows(self) -> dict[str, Array]:
+        """Matrices that convert displacements to the motion of every probe along x and y, shape (2, unknowns) each."""
+        return self._of_probes(self._rows_at)
+
+    @cached_property
+    def pair_rows(self) -> dict[str, Array]:
+        """Vectors that convert small displacements to the change of each pair's distance, shape (unknowns,) each."""
+        found = {}
+        for name, (a, b) in self.mechanism.pairs.items():
+            apart = np.array(self.mechanism.probes[b]) - self.mechanism.probes[a]
+            found[name] = apart @ (self.probe_rows[b] - self.probe_rows[a]) / np.hypot(*apart)
+        return found
+
+    def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
+        """Lines of the outline for plotting."""
+        return self.plate.outline_lines()
+
 
 KIND = "finite_element"
 TRUST, WHY_TRUSTED = (
@@ -78,7 +334,7 @@ class FiniteElementGripper(DrawnGripper):
 
     @cached_property
     def across_plane(self) -> OutOfPlane:
-        """First mode and sag out of the plane, with the drive fixed, computed in three dimensions (`deep_plate`)."""
+        """First mode and sag out of the plane, with the drive fixed, computed in three dimensions (`out_of_plane`)."""
         return out_of_plane(self.plane.mechanism)
 
     def figures(self) -> ModelFigures:

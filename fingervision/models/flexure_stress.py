@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
+from fingervision.models.bars import notch_factors
 from fingervision.models.elastic_mechanism import LargestStress
 from fingervision.models.flexure_span import FlexureSpan
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.hinge_stress import notch_factors
 from fingervision.models.mechanism import Mechanism
 
 Array = NDArray[np.float64]

@@ -1,10 +1,16 @@
 """The gripper as a general planar mechanism: one half with its symmetry, or both halves with their own dimensions."""
 
-from math import hypot
+from dataclasses import replace
+from math import atan2, cos, degrees, hypot, radians, sin
+from typing import Any
 
-from fingervision.domain.gripper import Gripper, PointMm
+import numpy as np
+
+from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.gripper import Gripper, Lever, Links, PointMm
 from fingervision.models.flexure import Flexure
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism
+from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Polygon, Shape, bar, box
 
 _FAR = 3.0
@@ -126,3 +132,218 @@ def _flexures(gripper: Gripper, side: float, prefix: str) -> tuple[Flexure, ...]
                 hinge.thickness_mm, hinge.radius_mm, hinge.radius_mm)
         for number, ((x, y), axis_deg) in enumerate(places, 1)
     )  # fmt: skip
+
+
+# Outline of a gripper's right half, and the geometric conditions that this outline must satisfy.
+#
+# One half of the gripper is the union of its bars and polygons, minus four notch discs, minus everything left of the
+# symmetry axis.
+
+_ON = 1e-6
+"""Distance on either side of a face at which material and void are tested, as a share of the gripper's height."""
+_SLIT = 0.05
+"""Width, as a share of the neck, of the slit cut through a neck to test whether the body then falls into two parts."""
+_ASKEW_DEG = 15.0
+"""Largest angle between a notch and its link: a notch at a larger angle is not a hinge of the link; its neck is then 4
+% longer than its height."""
+_STATED = 0.05
+"""Largest relative difference between the stated width and height and those drawn. The stated values are used in no
+computation."""
+
+
+def notch_centres_mm(gripper: Gripper) -> tuple[PointMm, ...]:
+    """Centres of the four discs that cut the two hinges: radius + thickness / 2 on either side of each hinge's axis."""
+    hinge, lever = gripper.hinge, gripper.lever
+    offset_mm = hinge.radius_mm + hinge.thickness_mm / 2.0
+    centres: list[PointMm] = []
+    for (x_mm, y_mm), axis_deg in ((lever.hinge1_mm, lever.hinge1_axis_deg), (lever.hinge2_mm, lever.hinge2_axis_deg)):
+        across = (-sin(radians(axis_deg)), cos(radians(axis_deg)))
+        centres += [(x_mm + side * offset_mm * across[0], y_mm + side * offset_mm * across[1]) for side in (-1, 1)]
+    return tuple(centres)
+
+
+def half_region(gripper: Gripper) -> PlanarRegion:
+    """The right half as a sequence of shapes added and removed; its outline is computed once per drawing."""
+    return half_mechanism(gripper).region
+
+
+def check_outline(gripper: Gripper, origin: str = "the drawing") -> None:
+    """Refuse a drawing whose outline is not that of a gripper with two hinges.
+
+    Raises
+    ------
+    DataError
+        If the half is not one body, a notch is a closed hole, a hinge does not connect the parts on its two sides or is
+        not their only connection, or the clamp, the drive face or the tip's inner face is not a face of the body.
+    """
+    region = half_region(gripper)
+    try:
+        outer = sum(loop.area_mm2 > 0.0 for loop in region.loops)
+    except FingervisionError as error:
+        raise DataError(f"In {origin}: {error}") from error
+    if outer != 1:
+        raise DataError(
+            f"The right half in {origin} must be one body, but the links and notches leave {outer} pieces; "
+            "check that the links overlap and that no notch cuts through one of them."
+        )
+    for number in (1, 2):
+        _check_hinge(gripper, number, origin)
+    _check_faces(gripper, region, origin)
+
+
+def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
+    region, hinge, links = half_region(gripper), gripper.hinge, gripper.links
+    (xa, ya), (xb, yb) = links.shuttle_from_mm, links.shuttle_to_mm
+    link_deg = 90.0 if number == 1 else degrees(atan2(yb - ya, xb - xa))
+    axis_deg = gripper.lever.hinge1_axis_deg if number == 1 else gripper.lever.hinge2_axis_deg
+    askew_deg = abs((axis_deg - link_deg + 90.0) % 180.0 - 90.0)
+    if askew_deg > _ASKEW_DEG:
+        raise DataError(
+            f"lever.hinge{number}_axis_deg in {origin} must be within {_ASKEW_DEG:g} degrees of the direction of "
+            f"its link, {link_deg:.4g} degrees, but is {axis_deg:g}."
+        )
+    x, y = gripper.lever.hinge1_mm if number == 1 else gripper.lever.hinge2_mm
+    if not region.holds(np.array([[x], [y]]))[0]:
+        raise DataError(
+            f"lever.hinge{number}_mm in {origin} must lie inside its link, but there is no material at "
+            f"({x:g}, {y:g}) mm; check its place and its axis."
+        )
+    centres = notch_centres_mm(gripper)[2 * number - 2 : 2 * number]
+    for centre in centres:
+        for loop in region.loops:
+            ends = [curve.origin for curve in loop.curves if not curve.is_straight]
+            if loop.area_mm2 < 0.0 and len(ends) == len(loop.curves) and np.allclose(ends, centre):
+                raise DataError(
+                    f"The notches of hinge {number} in {origin} must open through the faces of its link, but the disc "
+                    f"of hinge.radius_mm = {hinge.radius_mm:g} about ({centre[0]:.4g}, {centre[1]:.4g}) mm is a closed "
+                    "hole inside it; make hinge.radius_mm larger or the link narrower."
+                )
+    # Cut through the neck from disc to disc: the half must then separate into two parts.
+    (xa, ya), (xb, yb) = centres
+    saw = bar(xa, ya, xb, yb, _SLIT * hinge.thickness_mm)
+    pieces = [loop for loop in PlanarRegion((*region.steps, (False, saw))).loops if loop.area_mm2 > 0.0]
+    apart = _ON * gripper.body.height_mm
+    x0, x1, y0, _ = links.pillar_and_root_mm
+    foot = (0.5 * (x0 + x1), y0 + apart) if number == 1 else (apart, gripper.lever.drive_mm[1])
+    tip = (gripper.tip_corner_mm[0] + apart, gripper.measuring_point_mm[1])
+    parted = any(piece.holds(foot) and not piece.holds(tip) for piece in pieces)
+    if len(pieces) != 2 or not parted:
+        end = "clamp" if number == 1 else "drive"
+        raise DataError(
+            f"Hinge {number} in {origin} must be the only connection from the {end} to the tip, but other material "
+            f"beside the neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm connects them too; check "
+            f"lever.hinge{number}_mm, lever.hinge{number}_axis_deg and hinge.radius_mm against the link that it cuts."
+        )
+
+
+def _check_faces(gripper: Gripper, region: PlanarRegion, origin: str) -> None:
+    x0, x1, y0, _ = gripper.links.pillar_and_root_mm
+    lever = gripper.lever
+    half = min(lever.drive_face_half_width_mm, gripper.links.drive_block_mm[1])
+    inner_mm = gripper.tip_corner_mm[0]
+    tip_y = gripper.measuring_point_mm[1]
+    apart = _ON * gripper.body.height_mm
+    for name, (x, y), (nx, ny) in (
+        ("lower face of the pillar (links.pillar_and_root_mm)", (0.5 * (x0 + x1), y0), (0.0, 1.0)),
+        ("drive face (lever.drive_face_y_mm)", (0.5 * half, lever.drive_face_y_mm), (0.0, 1.0)),
+        ("tip's inner face at the measuring height (body.measured_below_tip_mm)", (inner_mm, tip_y), (1.0, 0.0)),
+    ):
+        beside = np.array([[x + apart * nx, x - apart * nx], [y + apart * ny, y - apart * ny]])
+        if region.holds(beside).tolist() != [True, False]:
+            raise DataError(
+                f"The {name} in {origin} must be a free face of the body, but at ({x:.5g}, {y:.5g}) mm there is none; "
+                "check the links."
+            )
+    if not region.holds(np.array([[apart], [lever.drive_mm[1]]]))[0]:
+        raise DataError(
+            f"lever.drive_mm in {origin} must lie in the drive block on the symmetry axis, but there is no material at "
+            f"(0, {lever.drive_mm[1]:g}) mm; check links.drive_block_mm."
+        )
+
+
+def check_stated_size(gripper: Gripper, origin: str) -> None:
+    """Refuse a drawing whose stated width or height differs from that of its links."""
+    region = half_region(gripper)
+    points = np.concatenate([c.at(np.linspace(c.t0, c.t1, 9)) for loop in region.loops for c in loop.curves], axis=1)
+    body = gripper.body
+    drawn = {
+        "width_mm": 2.0 * float(points[0].max()),
+        "height_mm": float(points[1].max()) - gripper.links.pillar_and_root_mm[2],
+    }
+    for name, value in drawn.items():
+        stated = getattr(body, name)
+        if abs(stated - value) > _STATED * value:
+            raise DataError(
+                f"body.{name} in {origin} must agree within {100.0 * _STATED:g} % with the dimensions of the links, "
+                f"which give {value:.6g} mm, but is {stated:g}; correct one of the two."
+            )
+
+
+# Change one dimension of a drawing, and adapt the dependent dimensions so that the links still meet.
+
+
+def redrawn(gripper: Gripper, name: str, by: float) -> Gripper:
+    """Change one dimension of a drawing, with its dependent dimensions.
+
+    Parameters
+    ----------
+    gripper : Gripper
+        The drawing.
+    name : str
+        Dotted name as in `gripper.toml`, such as `hinge.thickness_mm`. A longer `lever.l1_mm` or `lever.l2_mm` moves
+        hinge 1 with its pillar; `lever.l3_mm` the drive; `lever.l4_mm` both hinges with their links; `body.rest_gap_mm`
+        the tips.
+    by : float
+        Change in the dimension's own unit.
+
+    Raises
+    ------
+    DataError
+        If the name is not that of a dimension.
+    """
+    section, _, key = name.partition(".")
+    record: Any = getattr(gripper, section, None)
+    old = getattr(record, key, None)
+    if not isinstance(old, float):
+        raise DataError(f"A dimension of the drawing must have its name in gripper.toml, but is named {name}.")
+    parts: dict[str, Any] = {section: replace(record, **{key: old + by})}
+    changed = replace(gripper, **parts)
+    lever, links = changed.lever, changed.links
+    match name:
+        case "lever.l1_mm":
+            return replace(changed, lever=_hinge1_moved(lever, 0.0, by))
+        case "lever.l2_mm":
+            return replace(changed, lever=_hinge1_moved(lever, by, 0.0), links=_pillar_moved(links, by))
+        case "lever.l3_mm":
+            x0, x1, y0, y1 = links.drive_block_mm
+            block = (x0, x1, y0 - by, y1 - by)
+            return replace(
+                changed,
+                lever=replace(
+                    lever, drive_mm=_moved(lever.drive_mm, 0.0, -by), drive_face_y_mm=lever.drive_face_y_mm - by
+                ),
+                links=replace(links, shuttle_from_mm=_moved(links.shuttle_from_mm, 0.0, -by), drive_block_mm=block),
+            )
+        case "lever.l4_mm":
+            lever = replace(_hinge1_moved(lever, by, 0.0), hinge2_mm=_moved(lever.hinge2_mm, by, 0.0))
+            links = replace(_pillar_moved(links, by), shuttle_to_mm=_moved(links.shuttle_to_mm, by, 0.0))
+            return replace(changed, lever=lever, links=links)
+        case "body.rest_gap_mm":
+            tip = tuple(_moved(corner, 0.5 * by, 0.0) for corner in links.tip_polygon_mm)
+            return replace(changed, links=replace(links, tip_polygon_mm=tip))
+        case _:
+            return changed
+
+
+def _moved(point: PointMm, x_mm: float, y_mm: float) -> PointMm:
+    return point[0] + x_mm, point[1] + y_mm
+
+
+def _hinge1_moved(lever: Lever, x_mm: float, y_mm: float) -> Lever:
+    return replace(lever, hinge1_mm=_moved(lever.hinge1_mm, x_mm, y_mm))
+
+
+def _pillar_moved(links: Links, x_mm: float) -> Links:
+    x0, x1, y0, y1 = links.pillar_and_root_mm
+    a, b, c, d = links.cross_bar_mm
+    return replace(links, pillar_and_root_mm=(x0 + x_mm, x1 + x_mm, y0, y1), cross_bar_mm=(a + x_mm, b, c, d))

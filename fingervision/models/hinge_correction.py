@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from fingervision.domain.gripper import Material
-from fingervision.models.hinge_compliance import beam_compliance
-from fingervision.models.notch import Notch
+from fingervision.models.notch import Notch, beam_compliance
 
 Array = NDArray[np.float64]
 

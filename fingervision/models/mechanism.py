@@ -11,9 +11,8 @@ import numpy as np
 from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
-from fingervision.models.outline_curves import crossings
 from fingervision.models.planar_region import Loop, PlanarRegion
-from fingervision.models.plane_shapes import Shape, box
+from fingervision.models.plane_shapes import Shape, box, crossings
 from fingervision.models.width_effect import force_uncertainty
 
 _SIZES_MM = (0.3, 5000.0)

@@ -18,12 +18,11 @@ from fingervision.models.elastic_mechanism import MechanismState, named_forces_n
 from fingervision.models.flexure_span import FlexureSpan, span_of
 from fingervision.models.flexure_stress import nominal_stress
 from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Face, Mechanism, check_mechanism
-from fingervision.models.mechanism_bodies import LinkBody, bodies_of
+from fingervision.models.mechanism_bodies import MRAD, BodyPose, LinkBody, bodies_of
 from fingervision.models.mechanism_faces import driven_components, per_input_of
-from fingervision.models.mechanism_frame import MechanismFrame
 from fingervision.models.planar_region import PlanarRegion
-from fingervision.models.rigid_motion import MRAD, BodyPose
 
 Array = NDArray[np.float64]
 

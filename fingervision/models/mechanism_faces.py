@@ -1,12 +1,14 @@
 """Nodes of a meshed mechanism that are fixed, slide or are driven, and a test whether these supports suffice."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix, diags
 
 from fingervision.domain.errors import DataError
-from fingervision.models.mechanism import Drive, Face, Mechanism
+from fingervision.models.mechanism import Contact, Drive, Face, Mechanism
 from fingervision.models.plane_stress import PlaneStressPlate
 
 Array = NDArray[np.float64]
@@ -128,3 +130,191 @@ def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -
                     "share a part of the outline; shorten one of their boxes, or leave one of them out."
                 )
     return Supports(fixed, slides, driven)
+
+
+# Frictionless contact of two faces of a mechanism: gaps between nodes and segments, and their derivatives.
+#
+# The method is node-to-segment contact (Wriggers, Computational Contact Mechanics, chapter 9): the gap of a node of
+# one face is its distance from the nearest straight segment of the other face, or from a rigid wall.
+
+Bend = Callable[[Array], csr_matrix]
+
+_OVERHANG = 0.05
+"""Length by which the touched face is extended at its ends, as a share of its length: a node beyond an end can then
+still touch it. Faces that meet corner to corner slide a little past each other and would otherwise lose contact."""
+_PENETRATES = 1e-6
+"""Overlap of two faces at rest, as a share of the body's size, above which the drawing is refused as wrong."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactNodes:
+    """The nodes of a contact alone, without the rest of their mesh.
+
+    Parameters
+    ----------
+    places : ndarray of int, shape (k,)
+        Indices of the nodes in the mesh.
+    nodes_mm : ndarray of float, shape (2, k)
+        Positions of the nodes at rest; the motion of node i has the components 2 i and 2 i + 1.
+    """
+
+    places: Indices
+    nodes_mm: Array
+
+    @property
+    def x_dofs(self) -> Indices:
+        """Components along x."""
+        return 2 * np.arange(self.places.size)
+
+    @property
+    def y_dofs(self) -> Indices:
+        """Components along y."""
+        return self.x_dofs + 1
+
+    @property
+    def unknowns(self) -> int:
+        """Number of components."""
+        return 2 * self.places.size
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ContactPair:
+    """A pair of faces, or a face and a wall, that may touch.
+
+    Parameters
+    ----------
+    name : str
+        Name of the contact in messages and results.
+    nodes : ndarray of int, shape (k,)
+        Indices of the nodes that may touch.
+    segments : ndarray of int, shape (2, s)
+        Indices of the two end nodes of each segment of the other face, with the void to the segment's left; empty for a
+        wall.
+    wall_mm : ndarray of float, shape (2, 2), or None
+        Two points of a rigid wall, the void on its left.
+    """
+
+    name: str
+    nodes: Indices
+    segments: Indices
+    wall_mm: Array | None
+
+    @property
+    def _is_end(self) -> NDArray[np.bool_]:
+        """Whether the first and the second node of each segment is an end of the face, shape (2, s)."""
+        if self.wall_mm is not None:
+            return np.zeros((2, 1), dtype=bool)
+        nodes, place, count = np.unique(self.segments, return_inverse=True, return_counts=True)
+        del nodes
+        return np.asarray(count[place].reshape(self.segments.shape) == 1)
+
+    def alone(self, plate: PlaneStressPlate) -> tuple[ContactNodes, "ContactPair"]:
+        """Return the nodes of this contact, and the contact with indices among these nodes."""
+        places = np.unique(np.concatenate([self.nodes, self.segments.ravel()]))
+        own = replace(self, nodes=np.searchsorted(places, self.nodes), segments=np.searchsorted(places, self.segments))
+        return ContactNodes(places, plate.nodes_mm[:, places]), own
+
+    def gaps_mm(self, plate: PlaneStressPlate | ContactNodes, moved: Array) -> tuple[Array, csr_matrix, Bend]:
+        """Gap of every node, infinite for a node that faces no segment, with its first and second derivatives.
+
+        Returns
+        -------
+        ndarray of float, shape (k,)
+            Gap of each node (mm).
+        sparse matrix, shape (k, unknowns)
+            First derivatives of the gaps with respect to the displacements.
+        callable
+            Maps forces on the nodes to the sum of force times second derivative of the gap, shape (unknowns, unknowns);
+            the second derivatives arise because the normal rotates with the other face.
+        """
+        at = plate.nodes_mm + np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
+        points = at[:, self.nodes]
+        if self.wall_mm is not None:
+            first, second = self.wall_mm[:, :1], self.wall_mm[:, 1:]
+        else:
+            first, second = at[:, self.segments[0]], at[:, self.segments[1]]
+        chord = second - first
+        length = np.hypot(*chord)
+        along = chord / length
+        apart = points[:, :, None] - first[:, None, :]
+        way = np.sum(apart * along[:, None, :], axis=0)
+        inside = way
+        if self.wall_mm is None:
+            past = _OVERHANG * float(length.sum())
+            inside = np.clip(way, np.where(self._is_end[0], -past, 0.0), length + np.where(self._is_end[1], past, 0.0))
+        distance = np.hypot(*(apart - inside * along[:, None, :]))
+        nearest = np.argmin(distance, axis=1)
+        row = np.arange(self.nodes.size)
+        share = (inside / length)[row, nearest]
+        normal = np.stack([-along[1], along[0]])[:, nearest]
+        gap = np.sum(apart[:, row, nearest] * normal, axis=0)
+        beyond = self._is_end[:, nearest].any(axis=0) & (np.abs(way - inside)[row, nearest] > 1e-9 * length[nearest])
+        gap = np.where(beyond, np.inf, gap)
+        segments = self.segments[:, nearest] if self.wall_mm is None else np.tile(self.nodes, (2, 1))
+        held = self.wall_mm is None
+        places = np.stack([self.nodes, *segments])
+
+        def combined(weights: Array, direction: Array) -> csr_matrix:
+            """Weighted sums of the motions of a node and its segment's ends along a direction, one row per node."""
+            values = weights[:, None, :] * direction[None]
+            columns = np.stack([plate.x_dofs[places], plate.y_dofs[places]], axis=1)
+            rows = np.broadcast_to(row, values.shape)
+            return csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=(row.size, plate.unknowns))
+
+        ends = np.stack([np.ones(row.size), (share - 1.0) * held, -share * held])
+        slope = combined(ends, normal)
+
+        def bend(forces: Array) -> csr_matrix:
+            if not held:
+                return csr_matrix((plate.unknowns, plate.unknowns))
+            turned = combined(np.stack([np.zeros(row.size), -np.ones(row.size), np.ones(row.size)]), normal)
+            slid = combined(ends, along[:, nearest])
+            half = turned.T @ diags(-forces / length[nearest]) @ slid
+            return csr_matrix(half + half.T)
+
+        return gap, slope, bend
+
+
+def contact_pair(plate: PlaneStressPlate, contact: Contact, mechanism: Mechanism, size_mm: float) -> ContactPair:
+    """Find the nodes and segments of a contact that the drawing defines.
+
+    Raises
+    ------
+    DataError
+        If a face has no node, or the faces overlap at rest, or a wall lies behind its face.
+    """
+    nodes = nodes_on(plate, contact.face, mechanism, size_mm)
+    if contact.wall_mm is not None:
+        wall = np.array(contact.wall_mm).T
+        middle = plate.nodes_mm[:, nodes].mean(axis=1) - wall[:, 0]
+        along = wall[:, 1] - wall[:, 0]
+        if along[0] * middle[1] - along[1] * middle[0] < 0.0:
+            wall = wall[:, ::-1]
+        x, y = plate.nodes_mm
+        edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, nodes), axis=0)]
+        outward = np.array([np.sum(y[edges[0]] - y[edges[1]]), np.sum(x[edges[1]] - x[edges[0]])])
+        towards = np.array([wall[1, 1] - wall[1, 0], wall[0, 0] - wall[0, 1]])
+        if outward @ towards <= 0.0:
+            raise DataError(
+                f"The wall of contact {contact.name} of {mechanism.name} must lie in front of its face, but lies "
+                "behind the face, where the body is."
+            )
+        pair = ContactPair(contact.name, nodes, np.zeros((2, 0), dtype=np.int64), wall)
+    else:
+        wanted = nodes_on(plate, contact.other or contact.face, mechanism, size_mm)
+        edges = plate.outline_edges[:, np.all(np.isin(plate.outline_edges, wanted), axis=0)]
+        if edges.shape[1] == 0 or np.intersect1d(nodes, wanted).size:
+            raise DataError(
+                f"contact {contact.name} of {mechanism.name} must be between two separate faces, but part of the "
+                "outline belongs to both."
+            )
+        # The body lies on the right of an edge that runs so that the void is on its left.
+        segments = np.hstack([edges[[0, 2]], edges[[2, 1]]])
+        pair = ContactPair(contact.name, nodes, segments, None)
+    gap, _, _ = pair.gaps_mm(plate, np.zeros(plate.unknowns))
+    if gap.min() < -_PENETRATES * size_mm:
+        raise DataError(
+            f"The faces of contact {contact.name} of {mechanism.name} must be apart or touch at rest, but overlap by "
+            f"{-gap.min():.4g} mm."
+        )
+    return pair

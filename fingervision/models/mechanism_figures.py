@@ -1,12 +1,161 @@
 """Characteristic numbers of a mechanism that is described by its bodies, for any kind of model."""
 
+from dataclasses import dataclass
 from math import isfinite
 
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import ModelError
+from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.grip import Part
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_chain import MechanismChain
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_loads import operating_figures_of
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, out_of_plane
+
+# Effects of weight, temperature and a part between two probes on a mechanism, for small displacements.
+#
+# The effects of weight, temperature and a gripped part are computed by finite elements. A frame of bars would give
+# wrong results, because its bars end where their axes meet, unlike the bars of the drawing.
+
+Array = NDArray[np.float64]
+
+_STILL = 1e-3
+"""Smallest change of a pair's distance, as a share of the input, for a pair that can grip a part."""
+
+
+def operating_figures_of(model: MechanismPlate) -> dict[str, float]:
+    """Compute mechanical advantage, and the effects of weight and temperature.
+
+    Under weight and temperature the drive keeps its position, and so do the fixed faces and the sliding faces in their
+    fixed direction.
+
+    Parameters
+    ----------
+    model : MechanismPlate
+        Model of the drawing.
+
+    Returns
+    -------
+    dict of str to float
+        Numbers by name, with the unit at the end of the name.
+    """
+    figures: dict[str, float] = {}
+    for name in model.pair_rows:
+        if (pressed := GrippedPair(model, name)).per_input:
+            figures[f"{name}: mechanical advantage [N/N]"] = pressed.mechanical_advantage
+    for way, direction in (("-y", (0.0, -1.0)), ("x", (1.0, 0.0))):
+        hung = model.under_weight(direction)
+        for name, row in model.pair_rows.items():
+            figures[f"{name}: by its weight along {way} [mm]"] = float(row @ hung)
+        for name, rows in model.probe_rows.items():
+            figures[f"{name}: moved by its weight along {way} [mm]"] = float(np.hypot(*(rows @ hung)))
+    if (warmed := per_kelvin(model)) is not None:
+        grown, figures["force_per_kelvin_n"] = warmed
+        for name, row in model.pair_rows.items():
+            figures[f"{name}: per kelvin [mm/K]"] = float(row @ grown)
+        for name, rows in model.probe_rows.items():
+            for axis, row in zip("xy", rows, strict=True):
+                figures[f"{name}: {axis} per kelvin [mm/K]"] = float(row @ grown)
+    return figures
+
+
+def per_kelvin(model: MechanismPlate) -> tuple[Array, float] | None:
+    """Displacements (mm) and force at the held drive (N) per kelvin; None if the material states no expansion.
+
+    A free body expands without stress, each node by the strain times its position x. The displacements u therefore
+    satisfy K (u - strain x) = 0 at every unknown that is not fixed, with K the stiffness matrix.
+    """
+    plate, system = model.plate, model.driven
+    expansion = plate.material.thermal_expansion_per_k
+    if expansion is None:
+        return None
+    free = np.zeros(plate.unknowns)
+    free[plate.x_dofs], free[plate.y_dofs] = expansion * plate.nodes_mm
+    stiffness = system.stiffness_n_mm
+    grown = system.under_load(stiffness @ free)
+    return grown, float(system.by_input @ (stiffness @ (grown - free)))
+
+
+@dataclass(frozen=True, slots=True)
+class PairGrip:
+    """State of a part gripped between the two probes of a pair, at one input.
+
+    Parameters
+    ----------
+    input_mm, distance_mm : float
+        Input of the drive, and distance between the probes of the pair.
+    grip_n, force_n : float
+        Force on the part, and force at the drive along its direction.
+    stress_mpa : float
+        Largest stress in the flexures.
+    """
+
+    input_mm: float
+    distance_mm: float
+    grip_n: float
+    force_n: float
+    stress_mpa: float
+
+
+class GrippedPair:
+    """Two probes that press on a part between them, along the line that joins them.
+
+    The part touches at the probes, over a patch as large as the elements there; the indentation of the body is not
+    resolved.
+
+    Parameters
+    ----------
+    model : MechanismPlate
+        Model of the drawing.
+    pair : str
+        Name of the pair.
+    """
+
+    def __init__(self, model: MechanismPlate, pair: str) -> None:
+        self.model, self.pair = model, pair
+        row = model.pair_rows[pair]
+        change = float(row @ model.unit_displacement_mm)
+        self.per_input = change if abs(change) > _STILL else 0.0
+        self.rest_mm = model.state(0.0).pairs_mm[pair]
+        self._pushed = model.driven.under_load(row)
+        self.compliance_mm_n = float(row @ self._pushed)
+
+    @property
+    def mechanical_advantage(self) -> float:
+        """Gripping force on a rigid part per drive force, after first touch; the remaining drive force bends flexures.
+
+        By Betti's theorem, the gripping force N acts on the drive with N times the motion of the pair per unit of
+        input.
+        """
+        grip = abs(self.per_input) / self.compliance_mm_n
+        return grip / (self.model.stiffness_n_mm + grip * abs(self.per_input))
+
+    def touch_input_mm(self, part: Part) -> float:
+        """Input at which the fingers first touch the part (mm).
+
+        Raises
+        ------
+        ModelError
+            If the drive does not move the probes towards each other.
+        """
+        if not self.per_input:
+            raise ModelError(
+                f"The drive of {self.model.mechanism.name} must change the distance of pair {self.pair} so that it "
+                f"grips a part, but the distance changes by less than {_STILL:g} of the input."
+            )
+        return (part.width_mm - self.rest_mm) / self.per_input
+
+    def at(self, input_mm: float, part: Part) -> PairGrip:
+        """Find the equilibrium with the gripped part at one input."""
+        model = self.model
+        free_mm = self.rest_mm + self.per_input * input_mm
+        pressed_mm = max(part.width_mm - free_mm, 0.0)
+        grip = pressed_mm / (self.compliance_mm_n + 1.0 / part.stiffness_n_mm)
+        moved = input_mm * model.unit_displacement_mm + grip * self._pushed
+        force = model.stiffness_n_mm * input_mm - grip * self.per_input
+        return PairGrip(input_mm, free_mm + grip * self.compliance_mm_n, grip, force, model.peak_stress(moved).mpa)
+
 
 MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fingervision.models.outline_curves import Curve
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
+from fingervision.models.plane_shapes import Curve
 
 Array = NDArray[np.float64]
 

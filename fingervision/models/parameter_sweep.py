@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError, ModelError, UsageError
 from fingervision.domain.gripper import Gripper
-from fingervision.models.changed_drawings import ratios, scaled
-from fingervision.models.drive_block_root import block_shape, unit_compliance
-from fingervision.models.gripper_outline import check_outline
+from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.gripper_mechanism import check_outline, redrawn
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.lumped import LumpedGripper
+from fingervision.models.lumped import LumpedGripper, MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import mechanism_figures
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.models.redrawn import redrawn
+from fingervision.models.skeleton import block_shape, unit_compliance
+from fingervision.models.uncertainty import ratios, scaled
 
 Array = NDArray[np.float64]
 
@@ -35,7 +33,7 @@ _NODES = 5
 link's length by a third."""
 _TOLERANCE = 0.03
 """Largest error of the interpolation at the test points, as a share of the largest entry; the finite size of the
-block's mesh alone causes 2 % (`drive_block_root`)."""
+block's mesh alone causes 2 % (`skeleton`)."""
 _TRIED = 3
 _SAME = 1e-9
 

@@ -16,8 +16,7 @@ from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import Model, PhysicalLaw
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.response import Response
-from fingervision.models.drawn_answer import DrawnAnswer
-from fingervision.models.gripper_mechanism import whole_mechanism
+from fingervision.models.gripper_mechanism import redrawn, whole_mechanism
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model
@@ -25,8 +24,7 @@ from fingervision.models.laws import laws_of
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physics import LINEAR
 from fingervision.models.place_answers import PlaceAnswers
-from fingervision.models.redrawn import redrawn
-from fingervision.models.small_answer import SmallAnswer, ratio_curves, small_answer
+from fingervision.models.small_answer import DrawnAnswer, SmallAnswer, ratio_curves, small_answer
 
 Array = NDArray[np.float64]
 

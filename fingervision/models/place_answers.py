@@ -16,9 +16,9 @@ from scipy.optimize import brentq
 
 from fingervision.domain.gripper import PointMm
 from fingervision.models.corotational_frame import CorotationalFrame
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import LinkBody, body_weights
-from fingervision.models.mechanism_frame import MechanismFrame
 
 Array = NDArray[np.float64]
 

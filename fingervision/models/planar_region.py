@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
-from fingervision.models.outline_curves import Curve, crossings
-from fingervision.models.plane_shapes import Point, Polygon, Shape
+from fingervision.models.plane_shapes import Curve, Point, Polygon, Shape, crossings
 
 Array = NDArray[np.float64]
 

@@ -5,10 +5,172 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
-from fingervision.models.outline_curves import Curve, crossings
+# Curves of a plane outline: straight segments and elliptic arcs, and the points where two of them meet.
 
 Array = NDArray[np.float64]
+
+_WITHIN = 1e-9
+"""Relative tolerance beyond a curve's ends within which a point counts as on the curve, so that curves that share a
+corner meet there."""
+_SAMPLES = 181
+"""Samples along an arc at which crossings of two arcs are searched: crossings closer than 2 degrees are not
+separated."""
+_PARALLEL = 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A straight segment, p = origin + t u, or an elliptic arc, p = origin + u cos t + v sin t, for t from t0 to t1.
+
+    Parameters
+    ----------
+    origin, u : ndarray of float, shape (2,)
+        Start and extent of a segment; centre and first half axis of an arc. Millimetres.
+    v : ndarray of float, shape (2,), or None
+        Second half axis of an arc; None for a segment.
+    t0, t1 : float
+        Parameters at the start and the end; with t1 < t0 the curve runs backwards.
+    """
+
+    origin: Array
+    u: Array
+    v: Array | None
+    t0: float
+    t1: float
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the curve is a segment."""
+        return self.v is None
+
+    @property
+    def start_mm(self) -> Array:
+        """First point of the curve (mm)."""
+        return self.at(np.array([self.t0]))[:, 0]
+
+    @property
+    def end_mm(self) -> Array:
+        """Last point of the curve (mm)."""
+        return self.at(np.array([self.t1]))[:, 0]
+
+    def at(self, t: Array) -> Array:
+        """Points at given parameters, shape (2, n)."""
+        if self.v is None:
+            return np.asarray(self.origin[:, None] + np.outer(self.u, t))
+        return np.asarray(self.origin[:, None] + np.outer(self.u, np.cos(t)) + np.outer(self.v, np.sin(t)))
+
+    def direction(self, t: Array) -> Array:
+        """Unit tangents in the direction of travel, shape (2, n)."""
+        if self.v is None:
+            slope = np.repeat(self.u[:, None], len(t), axis=1)
+        else:
+            slope = np.outer(self.v, np.cos(t)) - np.outer(self.u, np.sin(t))
+        slope = slope * np.sign(self.t1 - self.t0)
+        return np.asarray(slope / np.hypot(*slope))
+
+    def curvature_radius_mm(self, t: Array) -> Array:
+        """Radius of curvature (mm); infinite for a segment."""
+        if self.v is None:
+            return np.full(len(t), np.inf)
+        first = np.outer(self.v, np.cos(t)) - np.outer(self.u, np.sin(t))
+        cross = abs(float(self.u[0] * self.v[1] - self.u[1] * self.v[0]))
+        return np.asarray(np.sum(first**2, axis=0) ** 1.5 / cross)
+
+    def part(self, t0: float, t1: float) -> "Curve":
+        """Return the part of the curve between two other parameters."""
+        return Curve(self.origin, self.u, self.v, t0, t1)
+
+    def level(self, points: Array) -> Array:
+        """Signed distance of points from the extended curve (line or whole ellipse), zero on the curve; shape (n,).
+
+        For a line, the value is the distance in mm; for an ellipse, it is the squared relative radius minus 1.
+        """
+        apart = points - self.origin[:, None]
+        if self.v is None:
+            return np.asarray((self.u[0] * apart[1] - self.u[1] * apart[0]) / np.hypot(*self.u))
+        unit = np.linalg.solve(np.column_stack([self.u, self.v]), apart)
+        return np.asarray(np.sum(unit**2, axis=0) - 1.0)
+
+    def holds(self, point: Array) -> bool:
+        """Whether a point on the extended curve lies between the curve's ends."""
+        apart = point - self.origin
+        if self.v is None:
+            t = float(apart @ self.u / (self.u @ self.u))
+            return min(self.t0, self.t1) - _WITHIN <= t <= max(self.t0, self.t1) + _WITHIN
+        c, s = np.linalg.solve(np.column_stack([self.u, self.v]), apart)
+        low, high = min(self.t0, self.t1), max(self.t0, self.t1)
+        turn = float(np.mod(np.arctan2(s, c) - low + _WITHIN, 2.0 * np.pi)) - _WITHIN
+        return turn <= high - low + _WITHIN
+
+
+def crossings(curve: Curve, other: Curve) -> list[float]:
+    """Parameters of a curve, strictly between its ends, at which it meets another curve or the end of another curve."""
+    found = _meetings(curve, other)
+    for corner in (other.start_mm, other.end_mm):
+        # Where two curves coincide, each is divided at the ends of the other.
+        found += _on_curve(curve, corner)
+    low, high = sorted((curve.t0, curve.t1))
+    margin = _WITHIN * (high - low)
+    return [t for t in found if low + margin < t < high - margin and other_holds(curve, other, t)]
+
+
+def other_holds(curve: Curve, other: Curve, t: float) -> bool:
+    """Whether the point at parameter t of one curve lies between the ends of another curve."""
+    return other.holds(curve.at(np.array([t]))[:, 0])
+
+
+def _on_curve(curve: Curve, point: Array) -> list[float]:
+    size = float(np.hypot(*curve.u))
+    if abs(float(curve.level(point[:, None])[0])) > 1e-9 * (size if curve.is_straight else 1.0):
+        return []
+    if curve.v is None:
+        return [float((point - curve.origin) @ curve.u / (curve.u @ curve.u))]
+    c, s = np.linalg.solve(np.column_stack([curve.u, curve.v]), point - curve.origin)
+    return _turned_into(curve, float(np.arctan2(s, c)))
+
+
+def _turned_into(curve: Curve, angle: float) -> list[float]:
+    low = min(curve.t0, curve.t1)
+    return [low + float(np.mod(angle - low, 2.0 * np.pi))]
+
+
+def _meetings(curve: Curve, other: Curve) -> list[float]:
+    if curve.v is None and other.v is None:
+        cross = curve.u[0] * other.u[1] - curve.u[1] * other.u[0]
+        if abs(cross) < _PARALLEL * np.hypot(*curve.u) * np.hypot(*other.u):
+            return []
+        apart = other.origin - curve.origin
+        return [float((apart[0] * other.u[1] - apart[1] * other.u[0]) / cross)]
+    if curve.v is None:
+        assert_v = np.column_stack([other.u, other.v])  # type: ignore[list-item]
+        a = np.linalg.solve(assert_v, curve.origin - other.origin)
+        b = np.linalg.solve(assert_v, curve.u)
+        square, half, rest = float(b @ b), float(a @ b), float(a @ a) - 1.0
+        below = half**2 - square * rest
+        if below < 0.0:
+            return []
+        return [(-half - below**0.5) / square, (-half + below**0.5) / square]
+    if other.v is None:
+        normal = np.array([-other.u[1], other.u[0]])
+        size, middle = np.hypot(normal @ curve.u, normal @ curve.v), np.arctan2(normal @ curve.v, normal @ curve.u)
+        wanted = float(normal @ (other.origin - curve.origin) / size)
+        if abs(wanted) > 1.0:
+            return []
+        half_turn = float(np.arccos(wanted))
+        return [t for sign in (-1.0, 1.0) for t in _turned_into(curve, float(middle + sign * half_turn))]
+    t = np.linspace(curve.t0, curve.t1, _SAMPLES)
+    level = other.level(curve.at(t))
+    if np.abs(level).max() < _WITHIN:
+        return []
+    found = [float(t[i]) for i in np.flatnonzero(level == 0.0)]
+    turns = np.flatnonzero(level[1:] * level[:-1] < 0.0).tolist()
+    return found + [
+        float(brentq(lambda s: float(other.level(curve.at(np.array([s])))[0]), t[i], t[i + 1])) for i in turns
+    ]
+
+
 Point = tuple[float, float]
 
 

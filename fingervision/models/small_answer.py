@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
 
@@ -127,3 +128,32 @@ def ratio_curves(gripper: Gripper, theory: HingeTheory, change: Callable[[float]
     if not np.all(np.abs(np.sign(steps).sum(axis=0)) == len(steps)):
         return None
     return RatioCurves(nodes, known[:, 0], known[:, 1])
+
+
+# Data from which effects of a drawing are computed: drawing, elastic body, response to a changed lever.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnAnswer:
+    """A drawing and its elastic response, as computed by one kind of model.
+
+    Parameters
+    ----------
+    gripper : Gripper
+        The drawing.
+    theory : HingeTheory
+        Theory of the hinges' compliance.
+    model : DrawnGripper
+        The gripper for small displacements, as this kind of model computes it.
+    input_range_mm : (float, float)
+        Smallest and largest input for which the model is valid.
+    lever : RatioCurves or None
+        Ratio of changed to unchanged response over the input, for a change of the length l2 of the lever arm that
+        determines the amplification.
+    """
+
+    gripper: Gripper
+    theory: HingeTheory
+    model: DrawnGripper
+    input_range_mm: tuple[float, float]
+    lever: RatioCurves | None

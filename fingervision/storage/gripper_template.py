@@ -8,10 +8,8 @@ from typing import Any
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper
-from fingervision.models.gripper_mechanism import whole_mechanism
-from fingervision.models.gripper_outline import check_outline
+from fingervision.models.gripper_mechanism import check_outline, redrawn, whole_mechanism
 from fingervision.models.mechanism import Mechanism, check_mechanism
-from fingervision.models.redrawn import redrawn
 from fingervision.storage.drawing_reader import DrawingReader, as_table
 from fingervision.storage.gripper_toml import read_gripper
 

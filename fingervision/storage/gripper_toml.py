@@ -9,7 +9,7 @@ from typing import Any
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material, SNLine
-from fingervision.models.gripper_outline import check_outline, check_stated_size
+from fingervision.models.gripper_mechanism import check_outline, check_stated_size
 from fingervision.models.plane_shapes import crosses_itself
 from fingervision.storage.toml_section import DRAWINGS, Section, read_document, refuse_other_file
 

@@ -21,8 +21,8 @@ from fingervision.diagnosis.bodies.body_prediction import BodyPrediction
 from fingervision.diagnosis.bodies.place_search import PlaceSearch
 from fingervision.diagnosis.bodies.place_words import set_words
 from fingervision.measuring.body_outlines import Placement
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.mechanism_bodies import bodies_of, plate_poses
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.place_answers import PlaceAnswers
 from fingervision.rendering import Camera, Patch, Scene, render
 from fingervision.rendering.deformed_plate import deformed_outlines

@@ -13,8 +13,8 @@ from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.spatial import Delaunay
 
 from fingervision.domain.frame import Frame
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.mechanism_bodies import bodies_of, plate_poses
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.rendering import Camera, Patch, Scene, render
 from fingervision.rendering.deformed_plate import deformed_outlines
 from tests.benchmarks.which_hinge import HINGES, Array, drawn, shifted, slip_at, slipping_fields, thicker

@@ -10,8 +10,8 @@ import numpy as np
 from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.gripper_mechanism import redrawn
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.redrawn import redrawn
 from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.gripper_toml import read_gripper

@@ -3,8 +3,7 @@
 import numpy as np
 
 from fingervision.domain.gripper import Material
-from fingervision.models.hinge_compliance import bar_compliance, beam_compliance
-from fingervision.models.notch import circular_notch
+from fingervision.models.notch import bar_compliance, beam_compliance, circular_notch
 from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 
 MATERIAL = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)

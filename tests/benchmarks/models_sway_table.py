@@ -4,9 +4,9 @@ import tomllib
 
 import numpy as np
 
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.hinge_correction import SWAY_SHEAR
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.lumped import MechanismFrame
 from fingervision.storage.mechanism_toml import mechanism_from_tables
 
 RADIUS_MM = 10.0

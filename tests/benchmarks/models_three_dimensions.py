@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.gripper import Gripper
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_mechanism import half_mechanism, whole_mechanism
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.out_of_plane import out_of_plane
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.models.mechanism import Face, Mechanism
-from fingervision.models.plane_mesh import PlaneMesh
+from fingervision.models.triangulate import PlaneMesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -22,10 +22,10 @@ from scipy.sparse.linalg import spsolve
 
 from fingervision.diagnosis.bodies.body_evidence import body_evidence
 from fingervision.domain.measured_table import Channel, MeasuredTable
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_mechanism import whole_mechanism
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import bodies_of, plate_poses
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.place_answers import PlaceAnswers
 from fingervision.models.plane_shapes import Polygon
 from fingervision.models.plane_stress import PlaneStressPlate

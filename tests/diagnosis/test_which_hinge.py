@@ -12,8 +12,8 @@ from click.testing import CliRunner
 from fingervision.cli.diagnose import command
 from fingervision.diagnosis.bodies.body_prediction import slip_mm
 from fingervision.domain.errors import DataError, FingervisionError
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.place_answers import PlaceAnswers, PlaceChanges
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.mechanism_toml import mechanism_from_tables

@@ -15,7 +15,7 @@ from fingervision.domain.status import Status
 from fingervision.measuring.body_outlines import Placement
 from fingervision.measuring.body_poses import BodyTracker
 from fingervision.measuring.drawing_placement import GivenPoint, by_points, by_silhouette, parse_point
-from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.rendering import Camera, Patch, Scene, render
 from fingervision.rendering.deformed_plate import deformed_outlines
 from fingervision.rendering.polygon import polygon

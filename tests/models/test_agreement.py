@@ -1,7 +1,7 @@
 """Kinds of model that differ by more than their errors are reported, with the kind to trust."""
 
-from fingervision.models.agreement import disagreements
 from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.kinds import disagreements
 
 
 def figures(slope: float, force: float, mode: float | None = None) -> ModelFigures:

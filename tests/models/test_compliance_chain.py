@@ -5,9 +5,8 @@ from hypothesis import strategies as st
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.grip import Part
-from fingervision.models.hinge_compliance import beam_compliance
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.notch import notches_of
+from fingervision.models.notch import beam_compliance, notches_of
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.stiffness_matrix import ComplianceChain, StiffnessMatrixGripper, carried, turned
 

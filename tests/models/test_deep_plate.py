@@ -7,9 +7,8 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from fingervision.domain.gripper import Gripper, Material
-from fingervision.models.deep_plate import DeepPlate
 from fingervision.models.gripper_mechanism import half_mechanism
-from fingervision.models.out_of_plane import out_of_plane
+from fingervision.models.out_of_plane import DeepPlate, out_of_plane
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import box
 from fingervision.models.triangulate import triangulate

@@ -9,10 +9,10 @@ from scipy.sparse.linalg import spsolve
 from skfem.helpers import ddot, eye, sym_grad, trace
 
 from fingervision.domain.errors import DataError
+from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.storage.mechanism_toml import read_mechanism
 
 E, NU, PLATE_MM = 1000.0, 0.3, 2.0

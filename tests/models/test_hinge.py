@@ -5,9 +5,8 @@ from hypothesis import strategies as st
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Material
-from fingervision.models.hinge_compliance import bar_compliance, beam_compliance
 from fingervision.models.hinge_correction import corrected_compliance
-from fingervision.models.notch import Notch, circular_notch, masses_t
+from fingervision.models.notch import Notch, bar_compliance, beam_compliance, circular_notch, masses_t
 from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 from tests.models import hinge_closed_forms as closed
 

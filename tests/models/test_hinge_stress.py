@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from fingervision.domain.gripper import Gripper
+from fingervision.models.bars import peak_hinge_stress
 from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.gripper_mechanism import redrawn
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.hinge_stress import peak_hinge_stress
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.redrawn import redrawn
 from fingervision.models.skeleton import skeleton_of
 
 NOTCH = 0.02

@@ -10,14 +10,12 @@ import pytest
 
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper
-from fingervision.models.corotational_body import CorotationalBody, turned_axes
-from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.gripper_mechanism import half_mechanism, whole_mechanism
+from fingervision.models.corotational_frame import CorotationalBody, turned_axes
+from fingervision.models.finite_element import FiniteElementGripper, MechanismPlate
+from fingervision.models.gripper_mechanism import half_mechanism, redrawn, whole_mechanism
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_chain import MechanismChain
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.models.physics import Physics
-from fingervision.models.redrawn import redrawn
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.models_sway_table import stiffnesses

@@ -10,9 +10,9 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
 from skfem.helpers import ddot, eye, grad, trace, transpose
 
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import Part
-from fingervision.models.mechanism_loads import GrippedPair, operating_figures_of
-from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.mechanism_figures import GrippedPair, operating_figures_of
 from fingervision.storage.mechanism_toml import mechanism_from_tables
 
 ARM_MM, END_MM, BEAK_MM = 12.0, 14.0, 48.0

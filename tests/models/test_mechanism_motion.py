@@ -12,11 +12,9 @@ from fingervision.cli.model import command
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import FingervisionError
 from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping
-from fingervision.models.frequency_response import frequency_response
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.models.modal_model import ModalModel
-from fingervision.models.modal_response import modal_motion
+from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.lumped import MechanismFrame
+from fingervision.models.modal_model import ModalModel, frequency_response, modal_motion
 from fingervision.storage.mechanism_toml import read_mechanism
 
 HALF_PERCENT, ONE_PERCENT = 0.005, 0.01

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.flexure import Flexure
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.storage.mechanism_toml import read_mechanism
 
 DRAWN = Path(__file__).parents[2] / "fingervision" / "models" / "mechanisms"

@@ -10,12 +10,10 @@ from scipy.integrate import solve_ivp
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError, UsageError
 from fingervision.domain.gripper import Gripper
-from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping
-from fingervision.models.damping_text import parse_damping
-from fingervision.models.frequency_response import frequency_response, resolved_frequencies_hz
+from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping, parse_damping
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.mechanism_plate import MechanismPlate
-from fingervision.models.modal_response import modal_motion
+from fingervision.models.modal_model import frequency_response, modal_motion, resolved_frequencies_hz
 from fingervision.models.motion_in_time import gripper_motion
 from fingervision.models.physics import Physics
 from fingervision.storage.mechanism_toml import read_mechanism

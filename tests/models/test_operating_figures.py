@@ -8,10 +8,9 @@ import pytest
 from scipy.optimize import minimize
 
 from fingervision.domain.gripper import Gripper, SNLine
-from fingervision.models.endurance import endurance
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.grip import Part, first_grip_mm, gripped, mechanical_advantage
-from fingervision.models.gripper_figures import operating_figures
+from fingervision.models.gripper_figures import endurance, operating_figures
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 

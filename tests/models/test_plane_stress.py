@@ -6,9 +6,9 @@ import skfem
 from scipy.sparse.linalg import eigsh, splu
 
 from fingervision.domain.gripper import Material
+from fingervision.models.mechanism_equilibrium import contact_forces_n
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.reference_mesh import PlaneMesh
-from fingervision.models.signorini import contact_forces_n
 
 STEEL = Material("test", 1000.0, 0.3, 1000.0, 1.0)
 PATCH = 1e-10

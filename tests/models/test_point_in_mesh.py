@@ -5,7 +5,7 @@ import pytest
 
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Ellipse, box
-from fingervision.models.point_in_mesh import element_weights
+from fingervision.models.plane_stress import element_weights
 from fingervision.models.triangulate import triangulate
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingervision.models.mechanism_plate import MechanismPlate
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.place_answers import PlaceAnswers
 from tests.benchmarks.which_hinge import drawn
 

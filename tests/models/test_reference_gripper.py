@@ -8,13 +8,12 @@ import pytest
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
+from fingervision.models.gripper_mechanism import redrawn
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physics import Physics
-from fingervision.models.published_table import COMSOL_MM, INPUT_MM
-from fingervision.models.redrawn import redrawn
-from fingervision.models.reference_mesh import PlaneMesh
+from fingervision.models.reference_mesh import COMSOL_MM, INPUT_MM, PlaneMesh
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.gripper_toml import read_gripper
 

@@ -13,11 +13,11 @@ from click.testing import CliRunner
 
 from fingervision.cli.model import command
 from fingervision.domain.errors import FingervisionError
+from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Drive, Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.storage.mechanism_toml import mechanism_from_tables, read_mechanism
 
 ROOT = Path(__file__).parents[2]

@@ -5,7 +5,7 @@ import pytest
 import skfem
 from skfem.helpers import dd, ddot, sym_grad, trace
 
-from fingervision.models.strip_width import stretched_share, strip_share
+from fingervision.models.flexure import stretched_share, strip_share
 
 NU = 0.34
 MORLEY = 0.04

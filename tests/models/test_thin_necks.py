@@ -10,11 +10,10 @@ from scipy.integrate import quad
 from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.hinge_compliance import beam_compliance
+from fingervision.models.gripper_mechanism import redrawn
 from fingervision.models.hinge_correction import HingeTheory, corrected_compliance
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.notch import Notch, circular_notch
-from fingervision.models.redrawn import redrawn
+from fingervision.models.notch import Notch, beam_compliance, circular_notch
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.width_effect import force_uncertainty, held_moduli
 from tests.benchmarks.hinge_solid import solid_compliance

@@ -11,11 +11,10 @@ from scipy.special import ndtri
 from fingervision.domain.errors import FingervisionError, ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.parameter import Estimate
-from fingervision.models.gripper_uncertainty import gripper_uncertainty
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.small_answer import small_answer
-from fingervision.models.uncertainty import propagate
+from fingervision.models.uncertainty import gripper_uncertainty, propagate
 
 ENDS = np.array([-0.5, 1.5])
 

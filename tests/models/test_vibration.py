@@ -8,10 +8,10 @@ from fingervision.domain.gripper import Gripper
 from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping, paper_rate
 from fingervision.models.generalized_alpha import integrate
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.modal_response import modal_motion
+from fingervision.models.modal_model import modal_motion
 from fingervision.models.mode_shapes import ModesWanted, mode_shapes
+from fingervision.models.motion_in_time import ReducedMotion
 from fingervision.models.physics import Physics
-from fingervision.models.stepped_response import ReducedMotion
 
 # Damping ratio of equation (4) by dimensionless frequency, printed with two or three digits.
 PAPER_RATIOS = {1.0: 0.045, 2.0: 0.376, 5.0: 1.13, 10.0: 2.0, 100.0: 7.7, 1e3: 24.8, 6e3: 61.0, 1e5: 248.0}

@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from fingervision.domain.errors import DataError, ModelError
-from fingervision.models.mechanism_uncertainty import mechanism_uncertainty
+from fingervision.models.uncertainty import mechanism_uncertainty
 from fingervision.storage.drawing_numbers import bare_tables, changed_tables
 from fingervision.storage.mechanism_toml import read_drawing
 

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 from fingervision.cli.model import command
 from fingervision.domain.errors import DataError, FingervisionError, ModelError, UsageError
+from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_figures import mechanism_figures
-from fingervision.models.mechanism_frame import MechanismFrame
-from fingervision.models.mechanism_plate import MechanismPlate
 from fingervision.storage.drawing_reader import number
 from fingervision.storage.mechanism_toml import is_mechanism, mechanism_from_tables, read_mechanism
 

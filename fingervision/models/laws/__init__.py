@@ -8,7 +8,7 @@ import pkgutil
 from types import ModuleType
 
 from fingervision.domain.model import PhysicalLaw
-from fingervision.models.drawn_answer import DrawnAnswer
+from fingervision.models.small_answer import DrawnAnswer
 
 
 def _modules() -> list[ModuleType]:

@@ -6,7 +6,7 @@ from fingervision.domain.effect import History, Values
 from fingervision.domain.model import PhysicalLaw
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
-from fingervision.models.drawn_answer import DrawnAnswer
+from fingervision.models.small_answer import DrawnAnswer
 
 EFFECT = "assembly_asymmetry"
 _HALF = Parameter("changed_half", "", -1.0, 1.0, "half whose link differs: 1 right, -1 left, 0 both oppositely",

@@ -7,7 +7,7 @@ import numpy as np
 from fingervision.domain.effect import History, Values
 from fingervision.domain.model import PhysicalLaw
 from fingervision.domain.response import Response
-from fingervision.models.drawn_answer import DrawnAnswer
+from fingervision.models.small_answer import DrawnAnswer
 
 EFFECT = "finger_contact"
 _DEPTHS = 60

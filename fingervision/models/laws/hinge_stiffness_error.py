@@ -6,9 +6,8 @@ from fingervision.domain.effect import History, Values
 from fingervision.domain.model import PhysicalLaw
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
-from fingervision.models.drawn_answer import DrawnAnswer
-from fingervision.models.redrawn import redrawn
-from fingervision.models.small_answer import ratio_curves
+from fingervision.models.gripper_mechanism import redrawn
+from fingervision.models.small_answer import DrawnAnswer, ratio_curves
 
 EFFECT = "hinge_stiffness_error"
 _SHARE = Parameter("thickness_share", "", 0.0, 1.0, "share of the hinges' thickness in it; the rest is the modulus",

@@ -11,8 +11,8 @@ from fingervision.domain.effect import History, Values
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.model import PhysicalLaw
 from fingervision.domain.response import Response
-from fingervision.models.drawn_answer import DrawnAnswer
 from fingervision.models.elastic_mechanism import pair_distances_mm
+from fingervision.models.small_answer import DrawnAnswer
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from fingervision.domain.effect import History, Values
 from fingervision.domain.model import PhysicalLaw
 from fingervision.domain.response import Response
-from fingervision.models.drawn_answer import DrawnAnswer
+from fingervision.models.small_answer import DrawnAnswer
 
 EFFECT = "lever_ratio_error"
 
