@@ -120,7 +120,7 @@ def _say(words: str, *, quiet: bool) -> None:
 def _print(found: "Account") -> None:
     import sys
 
-    from fingervision.tables.terminal_plot import terminal_plot
+    from fingervision.tables.account import terminal_plot
 
     document = found.document()
     click.echo(f"{found.path}: {found.what}")

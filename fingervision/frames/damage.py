@@ -27,7 +27,7 @@ class DamageTrail:
         self._entered: list[tuple[int, int]] = []
         self._last = -1
         # Reason for the damage, by number in coded order, until an undamaged key frame follows.
-        self._broken: dict[int, str] = {}
+        self._broken: dict[float, str] = {}
         self._stated_keys: set[int] = set()  # numbers of packets that are key frames according to the container
         self._recoveries: dict[int, int] = {}  # packet that completes a recovery: packet that began it
         self._given_up: set[int] = set()  # ticks of pictures that were lost since the damage
@@ -47,6 +47,11 @@ class DamageTrail:
             self.breaks("The frame is incomplete in the file.")
         if packet.pts is not None and not packet.is_discard and is_shown:
             heapq.heappush(self._entered, (packet.pts, self._last))
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether damage has been recorded that no key frame has ended."""
+        return bool(self._broken)
 
     def breaks(self, why: str) -> None:
         """Record that the last packet could not be decoded or was incomplete."""
@@ -79,6 +84,10 @@ class DamageTrail:
         """Record that a whole picture is missing after the last packet, which itself is undamaged."""
         self._last = next(self._numbers)
         self._broken[self._last] = why
+
+    def lacks(self, why: str) -> None:
+        """Record that a whole picture is missing before the last packet, which itself is undamaged."""
+        self._broken.setdefault(self._last - 0.5, why)
 
     def lost(self, tick: int, why: str) -> None:
         """Record a missing frame; it is yielded as a lost frame at its place in the order."""

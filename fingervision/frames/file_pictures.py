@@ -12,17 +12,65 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.frames.coded_times import is_shown
-from fingervision.frames.cut_off import cut_off
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.matroska_checksums import BROKEN, UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.matroska_times import ClusterTimes
-from fingervision.frames.missing_references import OWN_RECORDING, missing_references
+from fingervision.frames.missing_references import OWN_RECORDING, is_shown, missing_references
 from fingervision.frames.mp4_durations import NO_SCALE, states_another_duration
 from fingervision.frames.open_container import open_container
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
+
+
+def cut_off(
+    container: av.container.InputContainer, stream: av.VideoStream, packets: int, last_end_s: float | None
+) -> str | None:
+    """Return a sentence if the file states more video than it contains.
+
+    Parameters
+    ----------
+    container, stream : PyAV's
+        PyAV's objects for file and video stream, after reading to the end.
+    packets : int
+        Number of packets read.
+    last_end_s : float or None
+        End time of the last packet.
+
+    Returns
+    -------
+    str or None
+        A sentence; None if the file is complete.
+    """
+    kind = container.format.name
+    if "mp4" in kind and stream.frames > packets:
+        return f"The recording is truncated here: the file states {stream.frames} frames but contains {packets}."
+    stated_s = None
+    if "matroska" in kind:
+        stated_s = _clock_s(stream.metadata.get("DURATION")) or (
+            container.duration / av.time_base if container.duration and len(container.streams) == 1 else None
+        )
+    elif "avi" in kind and stream.duration and stream.time_base:
+        stated_s = float(stream.duration * stream.time_base)
+    if stated_s is None or not stream.average_rate:
+        return None
+    # A difference of one and a half frames is permitted, because containers round, and state the start or the end of
+    # the last frame.
+    if stated_s - (last_end_s or 0.0) > 1.5 / float(stream.average_rate):
+        return (
+            f"The recording is truncated here: the file states {stated_s:.2f} s but contains {last_end_s or 0.0:.2f} s."
+        )
+    return None
+
+
+def _clock_s(clock: str | None) -> float | None:
+    """Convert Matroska's hours:minutes:seconds to seconds."""
+    try:
+        hours, minutes, seconds = (float(part) for part in (clock or "").split(":"))
+    except ValueError:
+        return None
+    return 3600.0 * hours + 60.0 * minutes + seconds
+
 
 # Frame number of an AVI packet from its position in the file, because AVI stores no times, only an order.
 #
@@ -244,7 +292,7 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
             at_end = at_end or read.at_end
             if read.hole:
                 trail.breaks(f"{MISSING} after this frame ({read.hole}).")
-            yield from _decoded(packet, trail, heard, jpegs)
+            yield from _decoded(packet, trail, heard, jpegs, losses)
             if read.hole and not read.is_placed:
                 trail.hole(f"{MISSING} before this frame ({read.hole}).")
                 yield None, f"{MISSING} ({read.hole}); frames may be missing here."
@@ -355,7 +403,7 @@ def _first_packets(path: Path, stream: av.VideoStream) -> Iterator[bytes]:
 
 
 def _decoded(
-    packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard, jpegs: SoundJpeg
+    packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard, jpegs: SoundJpeg, losses: StreamLosses
 ) -> Iterator[Picture]:
     fault = jpegs.fault(bytes(packet)) if packet.size else ""
     if fault:
@@ -369,5 +417,7 @@ def _decoded(
         said = heard.of_picture()
     if said:
         trail.breaks(f"The frame is damaged in the file ({said}).")
+    if packet.size:
+        losses.decoded(packet, heard, trail)
     for picture in decoded:
         yield from trail.leaves(picture)

@@ -1,35 +1,33 @@
 """Find pictures of a file that depend on a missing picture, for codecs that do not number all pictures.
 
-H.264 numbers its pictures (see `reference_chain`), HEVC names the reference pictures, MPEG-2 has a constant rate
-(`transport_stream`). With other codecs, a missing packet causes no decoding error: the differences of the next picture
-are added to an older picture, and a moving finger is shown in an old position. Four criteria are used, all from data
-that are read before decoding:
+H.264 numbers its pictures (see `stream_losses`), HEVC names the reference pictures, MPEG-2 has a constant rate. With
+other codecs, a missing packet causes no decoding error: the differences of the next picture are added to an older
+picture, and a moving finger is shown in an old position. Two criteria are used, both from times that are read before
+decoding:
 
-* AV1 numbers the pictures in the order in which they are shown. If a number is omitted, a picture is missing;
-  consecutive numbers prove that none is missing, whatever the times are.
-* MPEG-4 part 2 toggles a bit with every P picture, which counts them modulo two. One missing P picture is visible in
-  the toggling bit. If the toggling bit is correct although a time is missing, an odd number of pictures was never
-  coded.
-* In MPEG-4 part 2 a B picture lies between two other pictures in time. A B picture that is presented after all pictures
-  received so far depends on a missing picture.
-* Times. In a file with equidistant times (coded at a constant rate), a gap in the times of a whole number of steps
-  means that pictures are missing. If times are irregular, or gaps are frequent, the camera or the encoder skipped
-  pictures, and a gap proves nothing: a missing VP8 or VP9 picture, or two missing pictures of MPEG-4, are then not
-  detected. If every n-th picture is a key frame and n packets lie between two key frames, no picture is missing: the
-  camera paused.
+* In a file with equidistant times (coded at a constant rate), a gap in the times of a whole number of steps means that
+  pictures are missing. If times are irregular, or gaps are frequent, the camera or the encoder skipped pictures, and a
+  gap proves nothing: a missing picture is then not detected. If every n-th picture is a key frame and n packets lie
+  between two key frames, no picture is missing: the camera paused.
+* A B picture (decoded when it is shown, in a file that decodes others earlier) lies between two other pictures in time.
+  A B picture that is presented after all pictures received so far depends on a missing picture.
 
 AVI is not judged by times, because AVI counts frames and marks an omitted frame by an empty chunk.
 """
 
 from bisect import bisect_right
 from collections import Counter
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from statistics import fmean, median
+from typing import Any
 
 import av
 
-from fingervision.frames.coded_times import CodedTime, coded_times
+from fingervision.frames.open_container import open_container
+from fingervision.frames.spoken_damage import listening
 
 COUNTED_CODECS = frozenset({"h264", "hevc", "vvc", "mpeg1video", "mpeg2video"})
 """Codecs, by FFmpeg's names, whose missing references are detected elsewhere."""
@@ -51,18 +49,11 @@ MOST_HOLES = 0.2
 BESIDE = 4
 # Key frames are regarded as regular if at least three distances between them are known, and nine in ten are equal.
 FEWEST_LENGTHS, KEYS_SHARE = 3, 0.9
-# The bit is regarded as toggling if it toggles in 95 % of at least ten pictures; a random bit toggles in half of them.
-FEWEST_TURNS, TURNING_SHARE = 10, 0.95
 
 OWN_RECORDING = "Recorded by fingervision, with a list of the lost frames in the same folder."
 """Comment in a container whose packets were checked during the recording, and whose list of lost frames is stored with
 it."""
 
-NUMBER_LEFT_OUT = "A picture on which the frame depends is missing: the numbers of the coded pictures have a gap."
-BIT_NOT_TURNED = (
-    "A picture on which the frame depends is missing: a bit that toggles with every coded picture (vop_rounding_type) "
-    "did not toggle."
-)
 SHOWN_TOO_LATE = (
     "A picture on which the frame depends is missing: the frame must be shown between two pictures, but "
     "the second is not there."
@@ -72,6 +63,55 @@ TIME_LEFT_OUT = (
     "missing before the frame. If the camera itself skipped these pictures, convert the file with `ffmpeg -i IN -c:v "
     "ffv1 -g 1 OUT.mkv`, and measure the converted file."
 )
+
+
+@dataclass(frozen=True, slots=True)
+class CodedTime:
+    """A packet of a video, in decoding order.
+
+    Parameters
+    ----------
+    tick : int or None
+        Presentation time of the picture.
+    is_key : bool
+        Whether decoding can start with this packet.
+    is_shown : bool
+        Whether the packet gives a picture; VP8 has packets that only serve as references.
+    is_needed : bool
+        Whether other pictures may depend on this one (it is no B picture).
+    """
+
+    tick: int | None
+    is_key: bool
+    is_shown: bool = True
+    is_needed: bool = True
+
+
+def is_shown(packet: "av.Packet[Any]", codec: str) -> bool:
+    """Whether a packet presents a picture, which VP8 states in a bit of the first byte (RFC 6386, 9.1)."""
+    return codec != "vp8" or bool(bytes(packet)[0] & 0x10)
+
+
+def coded_times(path: Path, stream: av.VideoStream) -> list[CodedTime]:
+    """Read the packets of a file, without decoding, as far as the file can be read.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    stream : av.VideoStream
+        The video stream, opened elsewhere.
+    """
+    read: list[tuple[int | None, int | None, bool, bool]] = []
+    codec = stream.codec.canonical_name
+    with listening(codec), suppress(av.FFmpegError, IndexError, OSError), open_container(path) as container:
+        packets = (packet for packet in container.demux(container.streams[stream.index]) if packet.size)
+        read.extend((packet.pts, packet.dts, packet.is_keyframe, is_shown(packet, codec)) for packet in packets)
+    is_reordered = any(pts is not None and dts is not None and pts > dts for pts, dts, _, _ in read)
+    return [
+        CodedTime(dts if pts is None else pts, key, shown, not is_reordered or key or pts != dts)
+        for pts, dts, key, shown in read
+    ]
 
 
 def missing_references(path: Path, stream: av.VideoStream, container_format: str) -> dict[int, str]:
@@ -96,57 +136,21 @@ def missing_references(path: Path, stream: av.VideoStream, container_format: str
     is_whole = codec.properties & INTRA_PROPERTY and codec.canonical_name not in ADAPTING_CODECS
     if is_whole or codec.canonical_name in COUNTED_CODECS:
         return {}
-    return judged(coded_times(path, stream), are_timed=any(name in container_format for name in TIMED_CONTAINERS))
+    if not any(name in container_format for name in TIMED_CONTAINERS):
+        return {}
+    return judged(coded_times(path, stream))
 
 
-def judged(packets: list[CodedTime], *, are_timed: bool) -> dict[int, str]:
+def judged(packets: list[CodedTime]) -> dict[int, str]:
     """Find the packets that depend on a missing picture before them.
 
     Parameters
     ----------
     packets : list of CodedTime
         All packets of a video, in decoding order.
-    are_timed : bool
-        Whether the container states a time for every picture.
     """
-    if sum(packet.order is not None for packet in packets) > len(packets) // 2:
-        return _by_number(packets)
-    found = _by_turn(packets)
-    if are_timed:
-        found = _by_time(packets, found) | found
-        found |= {number: SHOWN_TOO_LATE for number in _shown_too_late(packets) if number not in found}
-    return found
-
-
-def _by_number(packets: list[CodedTime]) -> dict[int, str]:
-    """Check AV1's picture numbers; if temporal layers were removed, all numbers have the same increment."""
-    numbered = [(number, packet) for number, packet in enumerate(packets) if packet.order is not None]
-    steps = [
-        (number, (packet.order - before.order) % packet.modulus)
-        for (_, before), (number, packet) in pairwise(numbered)
-        if packet.order is not None and packet.modulus is not None and before.order is not None and not packet.is_key
-    ]
-    usual = Counter(step for _, step in steps).most_common(1)[0][0] if steps else 1
-    return {number: NUMBER_LEFT_OUT for number, step in steps if step != usual}
-
-
-def _by_turn(packets: list[CodedTime]) -> dict[int, str]:
-    """Find packets after a missing picture by MPEG-4's rounding bit.
-
-    MPEG-4's rounding bit is used only if the P pictures of this stream toggle it. The first P picture after an I
-    picture is checked only if the rounding bit has the same value in nearly all first P pictures.
-    """
-    needed = [(number, packet) for number, packet in enumerate(packets) if packet.is_needed]
-    pairs = [(number, before, packet) for (_, before), (number, packet) in pairwise(needed) if packet.turn is not None]
-    inner = [(number, packet.turn != before.turn) for number, before, packet in pairs if before.turn is not None]
-    first = [(number, packet.turn) for number, before, packet in pairs if before.is_key]
-    found = [number for number, turns in inner if not turns]
-    if len(inner) < FEWEST_TURNS or len(found) > (1.0 - TURNING_SHARE) * len(inner):
-        return {}
-    usual, often = Counter(turn for _, turn in first).most_common(1)[0] if first else (None, 0)
-    if often >= TURNING_SHARE * len(first):
-        found += [number for number, turn in first if turn != usual]
-    return dict.fromkeys(found, BIT_NOT_TURNED)
+    found = dict.fromkeys(_shown_too_late(packets), SHOWN_TOO_LATE)
+    return found | _by_time(packets)
 
 
 def _shown_too_late(packets: list[CodedTime]) -> list[int]:
@@ -162,7 +166,7 @@ def _shown_too_late(packets: list[CodedTime]) -> list[int]:
     return found
 
 
-def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, str]:
+def _by_time(packets: list[CodedTime]) -> dict[int, str]:
     """Find holes in equidistant times, and the packets that may depend on the missing pictures."""
     shown = sorted({packet.tick for packet in packets if packet.is_shown and packet.tick is not None})
     steps = [after - before for before, after in pairwise(shown)]
@@ -173,7 +177,6 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
     if len(holes) > MOST_HOLES * len(steps):
         return {}
     needed = sorted((each.tick, k) for k, each in enumerate(packets) if each.is_needed and each.tick is not None)
-    keys = [each.tick for each in packets if each.is_key and each.tick is not None]
     key_numbers = [k for k, each in enumerate(packets) if each.is_key]
     found = {}
     for at, step in holes:
@@ -185,8 +188,6 @@ def _by_time(packets: list[CodedTime], unturned: dict[int, str]) -> dict[int, st
         number = needed[last - 1][1] + 1 if last else 0
         if number >= len(packets) or packets[number].is_key or _all_came(key_numbers, number, count):
             continue
-        if count % 2 and _turns_on(packets, number, unturned) and not _key_is_due(keys, at, count * usual):
-            continue  # the rounding bit shows that no picture is missing
         found[number] = TIME_LEFT_OUT.format(count=count)
     return found
 
@@ -204,22 +205,6 @@ def _all_came(key_numbers: list[int], number: int, count: int) -> bool:
     usual, often = Counter(lengths).most_common(1)[0]
     is_fixed = usual > 1 and often >= KEYS_SHARE * len(lengths)
     return is_fixed and lengths[behind - 1] == usual and count % usual != 0
-
-
-def _turns_on(packets: list[CodedTime], number: int, unturned: dict[int, str]) -> bool:
-    """Whether MPEG-4's rounding bit is in use, and the next P picture toggles it as if no picture were missing."""
-    before = next((each for each in reversed(packets[:number]) if each.is_needed), None)
-    following = next((k for k in range(number, len(packets)) if packets[k].is_needed), None)
-    if before is None or before.turn is None or following is None or packets[following].turn is None:
-        return False
-    return following not in unturned and before.turn != packets[following].turn
-
-
-def _key_is_due(keys: list[int], at: int, missing_ticks: float) -> bool:
-    """Whether a key frame, which resets MPEG-4's rounding bit, may be missing after a given time."""
-    before = bisect_right(keys, at)
-    every = min((b - a for a, b in pairwise(keys)), default=None)
-    return every is None or before == 0 or at + missing_ticks + TICKS >= keys[before - 1] + every
 
 
 def _sticks_out(steps: list[int], k: int) -> bool:

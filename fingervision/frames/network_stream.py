@@ -159,7 +159,7 @@ class NetworkStream:
                     losses.before(packet, trail)
                     trail.enters(packet)
                     losses.behind(packet, trail)
-                    for tick, found in self._decoded(packet, trail, heard):
+                    for tick, found in self._decoded(packet, trail, heard, losses):
                         time_s = self._time_s(tick, arrived_s, last_s)
                         item = self._item(next(numbers), time_s, found, last_s)
                         last_s = time_s
@@ -190,7 +190,9 @@ class NetworkStream:
     def _cut(self, why: str) -> str:
         return f"The stream {self.name} is interrupted ({why})."
 
-    def _decoded(self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard) -> Iterator[Picture]:
+    def _decoded(
+        self, packet: "av.Packet[av.VideoStream]", trail: DamageTrail, heard: Heard, losses: StreamLosses
+    ) -> Iterator[Picture]:
         if packet.size and (fault := self._jpegs.fault(bytes(packet))):
             trail.breaks(f"The frame arrived damaged ({fault}).")
         try:
@@ -206,6 +208,7 @@ class NetworkStream:
             said = heard.of_picture()
         if said:
             trail.breaks(f"The frame arrived damaged ({said}).")
+        losses.decoded(packet, heard, trail)
         for picture in pictures:
             yield from trail.leaves(picture)
 

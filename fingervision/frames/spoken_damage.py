@@ -11,6 +11,8 @@ import av
 STRICT = {"err_detect": "crccheck+explode"}
 # Errors in headers that do not affect pixels; cheap cameras write such headers into every picture.
 HARMLESS = ("unable to decode APP",)
+# Message of the H.264 decoder, at the level for developers, that the number of a picture does not follow the last one.
+LEAPS = "Frame num gap"
 # Other sources of messages at this level are FFmpeg's helpers (scaling, the log itself), which do not concern the
 # stream.
 HELPERS = ("swscaler", "swresampler", "")
@@ -34,9 +36,12 @@ class Heard:
     decoder: str
     warnings: tuple[str, ...] = ()
     log: list[tuple[int, str, str]] = field(default_factory=list)
+    has_leapt: bool = False
+    """Whether the decoder mentioned a gap in the numbers of pictures in its last messages."""
 
     def of_picture(self) -> str:
         """Return the first message of the decoder, and delete all of its messages; empty if there is no message."""
+        self.has_leapt = any(speaker == self.decoder and words.startswith(LEAPS) for _, speaker, words in self.log)
         said = [
             words.strip() for level, speaker, words in self.log if speaker == self.decoder and level <= av.logging.ERROR
         ]
@@ -60,7 +65,8 @@ class Heard:
 def listening(decoder: str, warnings: tuple[str, ...] = ()) -> Iterator[Heard]:
     """Collect FFmpeg's error log, and keep it off the screen."""
     before = av.logging.get_level()
-    av.logging.set_level(av.logging.WARNING if warnings else av.logging.ERROR)
+    plain = av.logging.WARNING if warnings else av.logging.ERROR
+    av.logging.set_level(av.logging.DEBUG if decoder == "h264" else plain)
     try:
         # The log of all threads is collected, because FFmpeg decodes slices in its own threads.
         with av.logging.Capture(local=False) as log:

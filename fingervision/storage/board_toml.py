@@ -20,7 +20,7 @@ active_low = ["busy", "alarm"]           # lines whose low level means true
 from pathlib import Path
 
 from fingervision.domain.board_settings import NEEDED_TO_MOVE, SELECT, BoardSettings, Line, Role
-from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_section import Section, read_section
 
 SCHEMA = 1
 FASTEST_PERIOD_MS, SLOWEST_PERIOD_MS = 4, 250
@@ -40,10 +40,7 @@ def read_board(path: Path) -> BoardSettings:
     DataError, InputFileError
         The file cannot be read, or a value in it is not allowed; the message names the line.
     """
-    values, text = read_document(path, "board")
-    top = Section(path, text, "", values)
-    top.only(("schema", "port", "force_rate_hz", "silence_ms", "settle_ms", "lines"))
-    top.schema(SCHEMA)
+    top = read_section(path, "board", ("port", "force_rate_hz", "silence_ms", "settle_ms", "lines"), SCHEMA)
     port = top.word("port")
     if not port:
         top.refuse("port", "must be the name of a serial port, such as /dev/ttyACM0 or COM3, but is empty.")

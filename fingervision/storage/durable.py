@@ -7,6 +7,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import monotonic
 
+from fingervision.domain.errors import OutputError
+
 FLUSH_EVERY_S = 0.5
 """Longest time between two flushes of a file that grows. What is added waits as long again for the next one, so that at
 most one second is lost when the program is killed or the power fails."""
@@ -40,6 +42,22 @@ def replaced(path: Path, unique: str = "") -> Iterator[Path]:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def written(path: Path, cure: str) -> Iterator[Path]:
+    """Write a file as `replaced` does; if that fails, the error names the file and what to do.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written; an older one is kept.
+    """
+    try:
+        with replaced(path) as part:
+            yield part
+    except OSError as error:
+        raise OutputError(f"{path} could not be written ({error.strerror}): {cure}.") from error
 
 
 def flush(path: Path) -> None:

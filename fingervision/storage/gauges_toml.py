@@ -8,8 +8,8 @@ from typing import Any
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from fingervision.domain.errors import DataError, InputFileError, OutputError
-from fingervision.storage.durable import replaced
+from fingervision.domain.errors import DataError, InputFileError
+from fingervision.storage.durable import written
 from fingervision.storage.plain_file import NotUtf8Error, plain
 from fingervision.storage.plain_file import text_of as file_text
 
@@ -100,11 +100,6 @@ def write_gauges_text(path: Path, text: str) -> None:
     OutputError
         The file cannot be written; its earlier version is kept.
     """
-    try:
+    with written(path, "the gauges are not lost; free disk space, and save again") as part:
         plain(path).parent.mkdir(parents=True, exist_ok=True)
-        with replaced(path) as part:
-            part.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(
-            f"{path} could not be written ({error.strerror}); the gauges are not lost: free disk space, and save again."
-        ) from error
+        part.write_text(text, encoding="utf-8")

@@ -3,13 +3,13 @@
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
 from fingervision.domain.effect import effect_key, split_key
 from fingervision.domain.errors import DataError, InputFileError
+from fingervision.domain.field import Field
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue, origin_of
 from fingervision.effects.position_error_map import curve_points, curve_values
@@ -24,7 +24,7 @@ from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
 from fingervision.storage.plain_file import in_utf8
 from fingervision.storage.simulation_table import read_simulation_table
-from fingervision.storage.toml_section import read_document
+from fingervision.storage.toml_section import Section, read_section
 from fingervision.storage.toml_text import toml_lines
 
 FMU_KEYS = ("input", "gap", "input_unit", "gap_unit")
@@ -64,54 +64,45 @@ def read_model(
     if path.suffix.lower() != ".toml":
         simulation = table(path)
         return CorrectedModel(simulation.name, simulation, str(path), simulation.input_range_mm, {})
-    document, _ = read_document(path, "model")
-    if "base" not in document:
+    top = read_section(path, "model")
+    if "base" not in top.values:
         return _gripper(path, kind)
-    if document.get("schema", 1) != 1:
-        raise DataError(
-            f"schema in {path} must be 1, but is {document['schema']!r}: the file was written by a newer "
-            "fingervision; update this one."
-        )
+    top.schema(1, 1)
     place = path.resolve()
     if place in inside:
-        raise DataError(
-            f"The base of {path} must be another model, but is the file itself or a model based on it: correct `base`."
-        )
-    kind = str(document.get("kind", kind))
-    named = document["base"]
-    if not (isinstance(named, str) and named.strip() and "\0" not in named):
-        raise DataError(f"The base in {path} must be the name of a file, but is {named!r}: correct it.")
-    base = read_model(path.parent / named, kind, (*inside, place), table)
-    names: dict[str, str] = {key: str(document[key]) for key in FMU_KEYS if key in document}
+        top.refuse("base", "must be another model, but is the file itself or a model based on it: correct it.")
+    named = top.word("base")
+    if not named.strip() or "\0" in named:
+        top.refuse("base", f"must be the name of a file, but is {named!r}: correct it.")
+    base = read_model(path.parent / named, top.word("kind", kind), (*inside, place), table)
+    names = {key: top.word(key) for key in FMU_KEYS if key in top.values}
     if names and isinstance(base.base, FunctionModel):
         base = replace(base, base=FunctionModel(base.base.path, {**base.base.names, **names}))
-    effects: dict[str, Mapping[str, Estimate]] = dict(base.effects)
-    origins: dict[str, str] = {}
-    entries = document.get("effect", [])
-    if not isinstance(entries, list):
-        raise DataError(f"The effects in {path} must be [[effect]] tables, but `effect` is {entries}: correct it.")
-    for entry in entries:
-        try:
-            parameters = dict(entry["parameters"])
-            points = [(float(at), float(error)) for at, error in parameters.pop(POINTS, [])]
-            stated = {
-                name: Estimate(float(value["value"]), float(value["u"]) if "u" in value else None)
-                for name, value in parameters.items()
-            }
-            curve = curve_values([at for at, _ in points], [error for _, error in points])
-            key = effect_key(str(entry["name"]), str(entry.get("place", "")), str(entry.get("end", "")))
-            origins[key] = str(entry.get("from", ""))
-            effects[key] = stated | {name: Estimate(value, None) for name, value in curve.items()}
-        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-            raise DataError(
-                f"An effect in {path} must have a name and parameters like play_mm = {{ value = 0.01, u = 0.001 }}, "
-                f"but is {entry}: correct it."
-            ) from error
-    for key, values in effects.items():
-        name = split_key(key)[0]
-        _check(name, values, path, origins.get(key, ""))
-        _check_curve(name, values, path)
+    effects = {**base.effects, **dict(map(_effect, top.tables("effect")))}
     return CorrectedModel(base.name, base.base, base.base_path, base.input_range_mm, effects, base.kind)
+
+
+def _effect(section: Section) -> tuple[str, dict[str, Estimate]]:
+    """Read an effect: its key and parameters; refuse one that is not known here."""
+    name, origin = section.word("name"), section.word("from", "")
+    if name not in catalogue() and origin:
+        advice = f"add `--effects {origin}`" if origin.endswith(".py") else f"install {origin}"
+        if origin == str(SESSION):
+            advice = "register it with @fingervision.effect, or keep it in a file for --effects"
+        section.refuse("name", f"must be an effect that is installed here, but {name} from {origin} is not: {advice}.")
+    stated = section.table("parameters")
+    known = {each.name: each for each in catalogue()[section.word("name", of=catalogue())].parameters}
+    values: dict[str, Estimate] = {}
+    for key, parameter in known.items():
+        slack = BOUND_SLACK * (parameter.upper - parameter.lower)
+        bounds = Field(unit=parameter.unit, low=parameter.lower - slack, high=parameter.upper + slack)
+        values[key] = Estimate(*stated.uncertain(key, bounds))
+    values |= {key: Estimate(*stated.uncertain(key, Field())) for key in stated.values if key not in (*known, POINTS)}
+    inputs, errors = stated.array(POINTS, (-1, 2)).T if stated.values.get(POINTS) else np.zeros((2, 0))
+    if inputs.size == 1 or np.any(np.diff(inputs) <= 0.0):
+        stated.refuse(POINTS, f"must be two or more pairs with rising inputs, but the inputs are {inputs.tolist()}.")
+    values |= {key: Estimate(value, None) for key, value in curve_values(inputs.tolist(), errors.tolist()).items()}
+    return effect_key(name, section.word("place", ""), section.word("end", "")), values
 
 
 def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
@@ -120,56 +111,6 @@ def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
         raise InputFileError(f"There is no model {path}.")
     everywhere = (-float("inf"), float("inf"))
     return CorrectedModel(path.name, FunctionModel(path, names), str(path), everywhere, {})
-
-
-def _check(name: str, values: Mapping[str, Estimate], path: Path, origin: str) -> None:
-    """Refuse an unknown effect, or an effect with a missing parameter; `origin` states where the effect came from."""
-    if name not in catalogue() and origin:
-        advice = f"add `--effects {origin}`" if origin.endswith(".py") else f"install {origin}"
-        if origin == str(SESSION):
-            advice = "register it with @fingervision.effect, or keep it in a file for --effects"
-        raise DataError(
-            f"The effect {name} in {path} must be installed here, but is not; it came from {origin}: {advice}."
-        )
-    if name not in catalogue():
-        near = get_close_matches(name, catalogue(), n=1)
-        hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
-        raise DataError(f"An effect in {path} must be one of the catalogue, but is {name}: {hint}")
-    wanted = [parameter.name for parameter in catalogue()[name].parameters]
-    missing = [key for key in wanted if key not in values]
-    if missing:
-        raise DataError(
-            f"The effect {name} in {path} must state {', '.join(wanted)}, but {', '.join(missing)} is not there "
-            f"(it states {', '.join(values) or 'nothing'}): add it."
-        )
-    for parameter in catalogue()[name].parameters:
-        estimate = values[parameter.name]
-        slack = BOUND_SLACK * (parameter.upper - parameter.lower)
-        if not parameter.lower - slack <= estimate.value <= parameter.upper + slack:
-            raise DataError(
-                f"{parameter.name} of the effect {name} in {path} must be {parameter.lower:g} to {parameter.upper:g}, "
-                f"but is {estimate.value:g}: correct it."
-            )
-        if estimate.u is not None and not 0.0 <= estimate.u < float("inf"):
-            raise DataError(
-                f"The standard uncertainty u of {parameter.name} of the effect {name} in {path} must be a finite "
-                f"number that is not negative, but is {estimate.u:g}: correct it, or leave it out."
-            )
-
-
-def _check_curve(name: str, values: Mapping[str, Estimate], path: Path) -> None:
-    """Refuse a curve with invalid or too few points, or with points that are not sorted by input."""
-    inputs, errors = curve_points({key: estimate.value for key, estimate in values.items()})
-    if inputs.size and not (
-        inputs.size > 1
-        and np.all(np.isfinite(inputs))
-        and np.all(np.isfinite(errors))
-        and np.all(np.diff(inputs) > 0.0)
-    ):
-        raise DataError(
-            f"{POINTS} of the effect {name} in {path} must be two or more pairs of finite numbers with rising inputs, "
-            f"but the inputs are {inputs.tolist()}: correct them."
-        )
 
 
 def _gripper(path: Path, kind: str) -> CorrectedModel:

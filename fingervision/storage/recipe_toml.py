@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fingervision.domain.recipe import Recipe
-from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_section import Section, read_section
 from fingervision.storage.toml_text import toml_lines
 
 SCHEMA = 1
@@ -19,15 +19,12 @@ def read_recipe(path: Path) -> Recipe[Section]:
     DataError, InputFileError
         The file does not exist, is not TOML, has a newer schema, has no step, or has an unknown key.
     """
-    document, text = read_document(path, "recipe")
-    top = Section(path, text, "", document)
-    top.only(("schema", "name", "below_force_n", "step"))
-    top.schema(SCHEMA)
+    top = read_section(path, "recipe", ("name", "below_force_n", "step"), SCHEMA)
     steps = top.tables("step")
     if not steps:
         top.refuse(None, "must have at least one [[step]], but has none: add one with its kind.")
     below_force_n = top.number("below_force_n", BELOW_FORCE_N, above=0.0)
-    return Recipe(top.word("name", path.stem), below_force_n, steps, text)
+    return Recipe(top.word("name", path.stem), below_force_n, steps, top.text)
 
 
 def write_recipe(

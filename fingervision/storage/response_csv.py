@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.errors import CalibrationError
-from fingervision.domain.errors import DataError, OutputError, UsageError
+from fingervision.domain.errors import DataError, UsageError
 from fingervision.storage.csv_columns import read_columns
+from fingervision.storage.durable import written
 
 COLUMNS = ("level", "light")
 # Full-scale levels of pictures, by bit depth.
@@ -74,7 +75,5 @@ def write_response(response: CameraResponse, path: Path) -> None:
     """
     top = response.top_level or 255
     rows = [f"{top * level:g},{light:.6f}" for level, light in zip(response.level, response.light, strict=True)]
-    try:
-        path.write_text("\n".join((",".join(COLUMNS), *rows)) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"The camera response could not be written to {path}: {error.strerror}.") from error
+    with written(path, "name another place with -o") as part:
+        part.write_text("\n".join((",".join(COLUMNS), *rows)) + "\n", encoding="utf-8")

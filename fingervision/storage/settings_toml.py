@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import OutputError
 from fingervision.domain.field import Field, names_of
-from fingervision.storage.durable import replaced
+from fingervision.storage.durable import written
 from fingervision.storage.plain_file import in_utf8
-from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_section import read_section
 from fingervision.storage.toml_text import toml_lines
 
 TIPS = ("auto", *(direction.value for direction in Direction))
@@ -69,8 +68,7 @@ def read_settings(path: Path) -> dict[str, Any]:
     DataError, InputFileError
         The file cannot be read, or a key is unknown or has a value that is not allowed.
     """
-    values, text = read_document(path, "settings")
-    top = Section(path, text, "", values)
+    top = read_section(path, "settings")
     settings = top.record(Settings)
     if settings.calibration is not None and settings.px_per_mm is not None:
         top.refuse("px_per_mm", "and calibration both give the scale: leave one out.")
@@ -115,9 +113,6 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
     camera = {key: value for key, value in (settings.get("camera") or {}).items() if value is not None}
     lines += toml_lines(camera, "[camera]") if camera else []
     text = in_utf8(path, "\n".join(lines) + "\n")
-    try:
+    with written(path, "free disk space, or name another folder") as part:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with replaced(path) as part:
-            part.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"{path} could not be written ({error.strerror}): free disk space.") from error
+        part.write_text(text, encoding="utf-8")

@@ -24,10 +24,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
-from fingervision.domain.errors import DataError, OutputError
+from fingervision.domain.errors import DataError
 from fingervision.domain.field import Field, names_of
 from fingervision.domain.step_data import MOST_STEPS, Coordinates, CycleTime, Operation, SpeedEntry, Step, StepData
-from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.durable import written
+from fingervision.storage.toml_section import Section, read_section
 from fingervision.storage.toml_text import toml_lines
 
 SCHEMA = 1
@@ -64,10 +65,7 @@ def read_steps(path: Path) -> StepData:
     DataError, InputFileError
         The file cannot be read, or a value in it is not allowed; the message names the line.
     """
-    values, text = read_document(path, "step data")
-    top = Section(path, text, "", values)
-    top.only(("schema", "name", "start_mm", "sequence", "step"))
-    top.schema(SCHEMA)
+    top = read_section(path, "step data", ("name", "start_mm", "sequence", "step"), SCHEMA)
     sections = top.tables("step")
     if not 1 <= len(sections) <= MOST_STEPS:
         raise DataError(
@@ -138,9 +136,5 @@ def write_steps(path: Path, data: StepData) -> None:
             "operation": step.operation, "pushing_force_n": step.pushing_force_n, "load_kg": step.load_kg,
         }  # fmt: skip
         lines += toml_lines(stated | asdict(step.entry), "[[step]]")
-    try:
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(
-            f"The step data of the motor controller could not be written to {path} ({error.strerror})."
-        ) from error
+    with written(path, "name another file") as part:
+        part.write_text("\n".join(lines) + "\n", encoding="utf-8")

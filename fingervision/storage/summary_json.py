@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import OutputError, UsageError
-from fingervision.storage.durable import replaced
+from fingervision.domain.errors import UsageError
+from fingervision.storage.durable import written
 from fingervision.storage.plain_file import json_of
 
 SUMMARY = "summary.json"
@@ -29,15 +29,9 @@ def write_summary(path: Path, summary: Mapping[str, Any]) -> None:
     OutputError
         The file cannot be written.
     """
-    try:
-        with replaced(path) as part:
-            # A file name that is not valid UTF-8 is written with JSON escapes.
-            part.write_text(summary_text(summary), encoding="utf-8", errors="backslashreplace")
-    except OSError as error:
-        raise OutputError(
-            f"{path} could not be written ({error.strerror}): free disk space or name another folder with "
-            "--out, and measure again."
-        ) from error
+    with written(path, "free disk space or name another folder with --out, and measure again") as part:
+        # A file name that is not valid UTF-8 is written with JSON escapes.
+        part.write_text(summary_text(summary), encoding="utf-8", errors="backslashreplace")
 
 
 def summary_text(summary: Mapping[str, Any]) -> str:

@@ -228,7 +228,7 @@ class Section:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             self.refuse(key, f"must be a table [{key}], but is {value!r}.")
-        return self._inner(key, value, 0)
+        return self._inner(key, value, self.place)
 
     def _inner(self, key: str, values: Mapping[str, Any], place: int) -> "Section":
         return Section(self.path, self.text, self.dotted(key), values, place, self.uncertainties, self.is_open)
@@ -277,7 +277,8 @@ class Section:
             return self.word(key, of=field.of or None)
         value = self._stated(key)
         if isinstance(value, dict) and self.uncertainties is not None:
-            value = self._uncertain(key, value)
+            value, u = self.uncertain(key, field)
+            self.uncertainties |= {} if u is None else {self.dotted(key): u}
         return self._one(key, value, kind, field)
 
     def array(self, key: str, shape: tuple[int, ...]) -> "NDArray[np.float64]":
@@ -296,14 +297,15 @@ class Section:
             self.refuse(key, f"must be {words} numbers, but is {value!r}.")
         return array
 
-    def _uncertain(self, key: str, value: dict[str, Any]) -> Any:
-        """Note the uncertainty of a number `{ value, u }`, and return the number."""
-        if set(value) != {"value", "u"}:
-            self.refuse(key, f"must be a number or {{value = ..., u = ...}}, but has the keys {', '.join(value)}.")
-        u = self._number(f"{key}.u", value["u"], Field(low=0.0))
-        if self.uncertainties is not None:
-            self.uncertainties[self.dotted(key)] = u
-        return value["value"]
+    def uncertain(self, key: str, field: Field) -> tuple[float, float | None]:
+        """Read a number, or `{ value, u }`: the number, and its standard uncertainty or None."""
+        value, u = self._stated(key), None
+        if isinstance(value, dict):
+            if not {"value"} <= set(value) <= {"value", "u"}:
+                self.refuse(key, f"must be a number or {{value = ..., u = ...}}, but has the keys {', '.join(value)}.")
+            u = self._number(f"{key}.u", value["u"], Field(low=0.0)) if "u" in value else None
+            value = value["value"]
+        return self._number(key, value, field), u
 
     def _tuple(self, key: str, value: Any, kind: Any, field: Field) -> tuple[Any, ...]:
         """Read a list: numbers, or points of numbers (`tuple[Point, ...]`)."""
@@ -326,3 +328,34 @@ class Section:
         if kind is int and number != int(number):
             self.refuse(key, f"must be a whole number, but is {value:g}.")
         return kind(number)
+
+
+def read_section(
+    path: Path, what: str, keys: Iterable[str] = (), newest: int | None = None, stated: int | None = None
+) -> Section:
+    """Read a TOML file as a section, with the keys and the schema number that it may have.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    what : str
+        Kind of file for error messages, such as `recipe`.
+    keys : iterable of str
+        Keys beside `schema`.
+    newest : int, optional
+        Newest schema number that this program reads; None leaves keys and number to the caller.
+    stated : int, optional
+        Number of a file that states none; by default, a file must state it.
+
+    Raises
+    ------
+    DataError, InputFileError
+        The file does not exist, is not TOML, is newer, or has an unknown key.
+    """
+    values, text = read_document(path, what)
+    top = Section(path, text, "", values)
+    if newest is not None:
+        top.only(("schema", *keys))
+        top.schema(newest, stated)
+    return top

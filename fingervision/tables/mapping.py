@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import DataError, OutputError
-from fingervision.storage.durable import replaced
+from fingervision.domain.errors import DataError
+from fingervision.storage.durable import written
 from fingervision.storage.plain_file import in_utf8
-from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_section import Section, read_document, read_section
 from fingervision.storage.toml_text import toml_lines
 
 NAME = "columns.toml"
@@ -98,10 +98,7 @@ def entry_for(table: Path, kind: str | None, columns: Path | None = None) -> Ent
     path = columns if columns is not None else table.parent / NAME
     if columns is None and not path.is_file():
         return Entry()
-    document, text = read_document(path, "mapping of columns")
-    top = Section(path, text, "", document)
-    top.only(("schema", "table"))
-    top.whole("schema", 1, low=1, high=1)
+    top = read_section(path, "mapping of columns", ("table",), 1, stated=1)
     found = Entry()
     for section in top.tables("table"):
         section.only(KEYS)
@@ -191,24 +188,18 @@ def write_entry(path: Path, table: str, kind: str | None, entry: Entry) -> bool:
 
     Raises
     ------
-    OutputError
+    DataError, InputFileError, OutputError
         The file cannot be read or written.
     """
     block = in_utf8(path, entry_text(table, kind, entry))
-    try:
-        before = path.read_text(encoding="utf-8-sig") if path.exists() else "schema = 1\n"
-        parts = [part.strip("\n") for part in re.split(r"(?m)^(?=\s*\[\[\s*table\s*\]\])", before)]
-        ours = block.splitlines()[: 2 if kind is None else 3]
-        kept = [part for part in parts if part and not _is_of(part, ours)]
-        if block.strip("\n") in parts:
-            return False
-        after = "\n\n".join([*kept, block])
-        with replaced(path) as part:
-            part.write_text(after, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(
-            f"{path} could not be written ({error.strerror}): name another file with --out, and give it to --columns."
-        ) from error
+    before = read_document(path, NAME)[1] if path.exists() else "schema = 1\n"
+    parts = [part.strip("\n") for part in re.split(r"(?m)^(?=\s*\[\[\s*table\s*\]\])", before)]
+    ours = block.splitlines()[: 2 if kind is None else 3]
+    kept = [part for part in parts if part and not _is_of(part, ours)]
+    if block.strip("\n") in parts:
+        return False
+    with written(path, "name another file with --out, and give it to --columns") as new:
+        new.write_text("\n\n".join([*kept, block]), encoding="utf-8")
     return True
 
 

@@ -14,13 +14,20 @@ from fingervision.tables.cells import to_numbers
 from fingervision.tables.column_choice import NEEDED, Findings, choose
 from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
 from fingervision.tables.dialect import MISSING, NO_NUMBER
-from fingervision.tables.doubts import doubts, dropped_out, filler_value, without_filler
+from fingervision.tables.doubts import (
+    doubts,
+    dropped_out,
+    filler_value,
+    unit_question,
+    unit_readings,
+    without_filler,
+    wrong_unit,
+)
 from fingervision.tables.mapping import Entry
 from fingervision.tables.own_format import refuse_long_table
 from fingervision.tables.questions import OpenQuestionError, Question, Reading, asked, span
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import clock_leaps, is_day_number, is_epoch, looks_like_time, seconds_of, without_leaps
-from fingervision.tables.unit_readings import unit_question, unit_readings, wrong_unit
 from fingervision.tables.units import factor, known_unit, spelled
 
 # Read cells that contain a number and its unit, such as the durations of MATLAB's timetables (`0.1 sec`).

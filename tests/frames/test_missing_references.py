@@ -7,8 +7,7 @@ import av
 import numpy as np
 import pytest
 
-from fingervision.frames.coded_times import CodedTime
-from fingervision.frames.missing_references import judged, missing_references
+from fingervision.frames.missing_references import CodedTime, judged, missing_references
 from tests.frames.test_missing_pictures import COUNT, coded, statuses, without, wrong
 
 KINDS: dict[str, tuple[str, str, dict[str, str]]] = {
@@ -40,48 +39,6 @@ def test_no_frame_that_hangs_on_a_missing_packet_is_whole(tmp_path: Path, kind: 
         assert statuses(fewer).count(".") >= (20 if len(gone) > 1 else COUNT - 20), gone
 
 
-def test_numbers_prove_that_nothing_is_missing_whatever_the_times_say(tmp_path: Path) -> None:
-    path = tmp_path / "clip.mkv"
-    coded(path, "libsvtav1", ticks=[k + (k > 30) + 2 * (k > 50) for k in range(COUNT)], g="40", preset="10")
-    assert statuses(path) == "." * COUNT
-
-
-def test_a_picture_that_the_camera_skipped_is_no_damage_where_the_bit_counts_none(tmp_path: Path) -> None:
-    path = tmp_path / "clip.mp4"
-    coded(path, "mpeg4", ticks=[k + (k > 27) + (k > 50) for k in range(COUNT)], g="20", bf="0")
-    assert statuses(path) == "." * COUNT
-
-
-def test_the_bit_tells_where_times_do_not(tmp_path: Path) -> None:
-    # Written anew one after the other, as programs do that know a rate and no times.
-    path, other = tmp_path / "clip.mp4", tmp_path / "other.mp4"
-    coded(path, "mpeg4", g="20", bf="0")
-    with av.open(str(path)) as whole, av.open(str(other), "w") as container:
-        stream = whole.streams.video[0]
-        copied = container.add_stream_from_template(stream, opaque=True)
-        packets = [packet for number, packet in enumerate(whole.demux(stream)) if packet.size and number != 31]
-        for number, packet in enumerate(packets):
-            assert packet.duration is not None
-            packet.pts = packet.dts = number * packet.duration
-            packet.stream = copied
-            container.mux(packet)
-    # What came before the missing picture is right, and so is what comes from the next key frame on.
-    assert statuses(other) == "." * 31 + "x" * 8 + "." * (COUNT - 40)
-
-
-def test_a_picture_between_two_others_costs_no_other(tmp_path: Path) -> None:
-    path = tmp_path / "clip.mkv"
-    coded(path, "mpeg4", g="60", bf="2")
-    with av.open(str(path)) as container:
-        packets = [bytes(packet) for packet in container.demux(video=0) if packet.size]
-    # vop_coding_type 2 stands behind the start code of a picture (ISO/IEC 14496-2, 6.2.5).
-    between = [k for k, packet in enumerate(packets) if packet[packet.index(b"\0\0\1\xb6") + 4] >> 6 == 2]
-    gone = {next(k for k in between if k > 20), next(k for k in between if k > 40)}
-    found = statuses(without(path, gone))
-    # The one that is decoded next may hang on what is missing as far as is known then.
-    assert found.count(".") >= COUNT - len(gone) - 2
-
-
 def row(ticks: "np.ndarray", key_every: int = 30) -> list[CodedTime]:
     """Packets without picture numbers, as in VP9."""
     return [CodedTime(int(tick), number % key_every == 0) for number, tick in enumerate(np.round(ticks))]
@@ -107,31 +64,21 @@ def variable_rates() -> dict[str, "np.ndarray"]:
 
 @pytest.mark.parametrize("kind", variable_rates())
 def test_sound_recordings_of_variable_rate_have_no_false_alarm(kind: str) -> None:
-    assert judged(row(variable_rates()[kind]), are_timed=True) == {}
-
-
-def test_a_missing_key_frame_sets_no_bit_right() -> None:
-    # The bit is 0 at each I picture, and 1 behind it, as if the one that is missing had never been coded.
-    turns = [None if k % 15 == 0 else k % 15 % 2 for k in range(90)]
-    packets = [CodedTime(40 * k, k % 15 == 0, turn=turns[k]) for k in range(90)]
-    assert judged(packets, are_timed=True) == {}
-    assert sorted(judged(packets[:45] + packets[46:], are_timed=True)) == [45]
-    assert sorted(judged(packets[:40] + packets[41:], are_timed=True)) == [40]
+    assert judged(row(variable_rates()[kind])) == {}
 
 
 def test_a_picture_between_two_of_which_one_came_hangs_on_a_missing_one() -> None:
     # Shown after all that came, with the last P picture of the file missing: no hole is left in the times.
     shown = [0, 3, 1, 2, 6, 4, 5, 9, 7, 8, 12, 10, 11, 15, 13, 14]
     packets = [CodedTime(40 * k, k == 0, is_needed=k % 3 == 0) for k in shown]
-    assert judged(packets, are_timed=True) == {}
-    assert sorted(judged([each for each in packets if each.tick != 600], are_timed=True)) == [13, 14]
+    assert judged(packets) == {}
+    assert sorted(judged([each for each in packets if each.tick != 600])) == [13, 14]
 
 
 @pytest.mark.parametrize("step", [40.0, 1000.0 / 30.0, 1000.0 / 240.0, 3003.0])
 def test_every_hole_of_an_even_row_is_found(step: float) -> None:
     ticks = np.delete(np.arange(900) * step, [1, 47, 48, 300, 500, 501, 502])
-    assert sorted(judged(row(ticks, 1000), are_timed=True)) == [1, 46, 297, 496]
-    assert judged(row(ticks, 1000), are_timed=False) == {}
+    assert sorted(judged(row(ticks, 1000))) == [1, 46, 297, 496]
 
 
 @pytest.mark.parametrize("lost", [None, 39])
@@ -159,18 +106,18 @@ def test_hidden_pictures_take_no_time(tmp_path: Path, lost: int | None) -> None:
 def test_a_camera_that_paused_lost_nothing_as_its_key_frames_prove() -> None:
     # Every 12th coded picture is a key frame; the coder does not count the 27 that the camera never took.
     packets = row(40.0 * np.arange(120) + np.where(np.arange(120) > 65, 27 * 40.0, 0.0), 12)
-    assert judged(packets, are_timed=True) == {}
+    assert judged(packets) == {}
     for lost in (61, 63, 66, 70):
-        assert len(judged(packets[:lost] + packets[lost + 1 :], are_timed=True)) >= 1
+        assert len(judged(packets[:lost] + packets[lost + 1 :])) >= 1
     # As many as lie between two key frames may have been lost: then the count proves nothing.
     packets = row(40.0 * np.arange(120), 12)
-    assert sorted(judged(packets[:66] + packets[78:], are_timed=True)) == [66]
+    assert sorted(judged(packets[:66] + packets[78:])) == [66]
 
 
 def test_a_hole_before_a_key_frame_harms_nothing() -> None:
     packets = row(np.delete(np.arange(100) * 40.0, 47), 1000)
     packets[47] = replace(packets[47], is_key=True)
-    assert judged(packets, are_timed=True) == {}
+    assert judged(packets) == {}
 
 
 def test_codecs_that_count_are_left_to_their_numbers(tmp_path: Path) -> None:

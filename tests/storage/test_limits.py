@@ -37,7 +37,7 @@ def test_a_parameter_outside_its_bounds_is_refused(tmp_path: Path, value: str) -
 
 @pytest.mark.parametrize("u", ["nan", "inf", "-1.0"])
 def test_an_uncertainty_that_is_none_is_refused(tmp_path: Path, u: str) -> None:
-    with pytest.raises(DataError, match="u of play_mm"):
+    with pytest.raises(DataError, match=r"play_mm\.u in line 5"):
         read_model(model(tmp_path, f"play_mm = {{ value = 0.01, u = {u} }}"))
 
 
