@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.matroska_checksums import BROKEN, UNCHECKED_CODECS, ClusterChecksums
-from fingervision.frames.matroska_times import ClusterTimes
 from fingervision.frames.missing_references import OWN_RECORDING, is_shown, missing_references
 from fingervision.frames.mp4_durations import NO_SCALE, states_another_duration
 from fingervision.frames.open_container import open_container
@@ -241,10 +240,6 @@ NO_COUNT = (
     f"{MISSING} here. AVI files contain no times, only a count of frames, so that the times of the following "
     "frames are not known."
 )
-NO_CLUSTER = (
-    "The time that the file states for the next frames (a Matroska cluster) is damaged, because it contradicts the "
-    "file's index or the neighbouring frames; the times of these frames are not known."
-)
 
 
 def pictures(container: av.container.InputContainer, stream: av.VideoStream, path: Path) -> Iterator[Picture]:
@@ -341,8 +336,6 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
     """Read packets one ahead, because a gap in the stream is only visible in the packet after it."""
     demuxed = container.demux(stream)
     places = AviPlaces(path, stream.index, len(container.streams)) if container.format.name == "avi" else None
-    clusters = ClusterTimes(path, stream.index) if "matroska" in container.format.name else None
-    is_doubtful = False
     is_timeless = "mp4" in container.format.name and states_another_duration(path)
     before: _Read | None = None
     while True:
@@ -366,11 +359,6 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
                 packet.pts = packet.dts = None
             else:
                 packet.pts, packet.dts = None if packet.pts is None else packet.pts + number - packet.dts, number
-        if clusters is not None and packet is not None and packet.size:
-            was_doubtful, is_doubtful = is_doubtful, clusters.is_doubtful(packet.pos)
-            loses_time = NO_CLUSTER if is_doubtful and not was_doubtful else ""
-            if is_doubtful:
-                packet.pts = packet.dts = None
         if is_timeless and packet is not None:
             packet.pts = packet.dts = None
         if before is not None:

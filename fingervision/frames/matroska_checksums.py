@@ -7,18 +7,21 @@ wrong, every picture of the cluster counts as damaged, and so does every later p
 picture. Codecs that detect damage themselves are not checked by checksums, because a codec rejects a single picture
 whereas a wrong checksum rejects a whole cluster; for them a wrong checksum only says that times may be damaged.
 
-Source: RFC 9559 (Matroska), 5.1.3 (clusters); RFC 8794 (EBML), 11.3.1 (CRC-32: of ISO 3309, little-endian).
+Source: RFC 9559 (Matroska), 5.1.3 (clusters); RFC 8794 (EBML), 4 (sizes), 11.3.1 (CRC-32: of ISO 3309, little-endian).
 """
 
 from binascii import crc32
 from bisect import bisect_right
 from pathlib import Path
+from typing import BinaryIO
 
-from fingervision.frames.ebml import FileBytes, element
-from fingervision.frames.matroska_times import CLUSTER
-
-CHECKSUM = b"\xbf"
-CHECKSUM_BYTES, ELEMENT_BYTES = 4, 6
+CLUSTER = b"\x1f\x43\xb6\x75"
+"""Name of a cluster (its EBML identifier)."""
+CHECKSUM = b"\xbf\x84"
+"""Name and length of a CRC-32, before its four bytes."""
+LONGEST_SIZE, CHECKSUM_BYTES = 8, 6
+# Number of bytes that are searched at once. The pages of a memory map would stay in memory, as many as the file has.
+BLOCK_BYTES = 1 << 20
 UNCHECKED_CODECS = frozenset({"vp8", "vp9"})
 """Codecs, by FFmpeg's canonical names, that decode any bytes without an error."""
 BROKEN = (
@@ -43,7 +46,7 @@ class ClusterChecksums:
         """Whether every cluster has a checksum that agrees with its bytes."""
         try:
             with path.open("rb") as file:
-                self._read(FileBytes(file))
+                self._read(file)
         except (OSError, ValueError):
             return
 
@@ -59,24 +62,36 @@ class ClusterChecksums:
         """Whether a cluster of a file with checksums has a wrong one, or none."""
         return self.are_stated and not self.cover_all
 
-    def _read(self, content: FileBytes) -> None:
-        at, clusters = content.find(CLUSTER), 0
+    def _read(self, file: BinaryIO) -> None:
+        size, at, clusters = file.seek(0, 2), _find(file, 0), 0
         while at >= 0:
             clusters += 1
-            cluster, end = element(content, at), at + len(CLUSTER)
-            if cluster is not None:
-                stated = _stated(content, cluster.begin)
-                self.are_stated = self.are_stated or stated is not None
-                if stated is not None and crc32(content[cluster.begin + ELEMENT_BYTES : cluster.end]) == stated:
-                    self._sound.append((at, cluster.end))
-                    end = cluster.end
-            at = content.find(CLUSTER, end)
+            file.seek(at + len(CLUSTER))
+            head = file.read(LONGEST_SIZE + CHECKSUM_BYTES)
+            # A number of 1 to 8 bytes, of which the first bit that is 1 tells how many (RFC 8794, 4).
+            length = 9 - head[0].bit_length() if head else 0
+            stated = int.from_bytes(head[:length], "big") & ((1 << 7 * length) - 1)
+            begin, next_at = at + len(CLUSTER) + length, at + len(CLUSTER)
+            if head[length : length + len(CHECKSUM)] == CHECKSUM:
+                self.are_stated = True
+                # A cluster of unknown length, as in live streams, extends to the file's end.
+                end = size if stated == (1 << 7 * length) - 1 else min(begin + stated, size)
+                file.seek(begin + CHECKSUM_BYTES)
+                found = crc32(file.read(max(0, end - begin - CHECKSUM_BYTES)))
+                if head[length : length + CHECKSUM_BYTES] == CHECKSUM + found.to_bytes(4, "little"):
+                    self._sound.append((at, end))
+                    next_at = end
+            at = _find(file, next_at)
         self.cover_all = self.are_stated and clusters == len(self._sound)
 
 
-def _stated(content: FileBytes, at: int) -> int | None:
-    """Checksum at the beginning of a cluster; None if the cluster has no checksum."""
-    first = element(content, at)
-    if first is None or first.name != CHECKSUM or first.end - first.begin != CHECKSUM_BYTES:
-        return None
-    return int.from_bytes(content[first.begin : first.end], "little")
+def _find(file: BinaryIO, begin: int) -> int:
+    """Position at which a cluster first begins from a position on; -1 if none does."""
+    while True:
+        file.seek(begin)
+        block = file.read(BLOCK_BYTES)
+        if (inside := block.find(CLUSTER)) >= 0:
+            return begin + inside
+        if len(block) < BLOCK_BYTES:
+            return -1
+        begin += BLOCK_BYTES - len(CLUSTER) + 1

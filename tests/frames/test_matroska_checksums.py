@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fingervision.domain.frame import Frame
-from fingervision.frames.matroska_times import CLUSTER
+from fingervision.frames.matroska_checksums import CLUSTER
 from fingervision.frames.source import open_source
 from tests.frames.test_damage import COUNT, RATE_HZ, SIZE_PX, film, nothing_wrong, packets, read
 
