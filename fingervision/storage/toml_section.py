@@ -278,7 +278,8 @@ class Section:
         value = self._stated(key)
         if isinstance(value, dict) and self.uncertainties is not None:
             value, u = self.uncertain(key, field)
-            self.uncertainties |= {} if u is None else {self.dotted(key): u}
+            if u is not None:
+                self.uncertainties[self.dotted(key)] = u
         return self._one(key, value, kind, field)
 
     def array(self, key: str, shape: tuple[int, ...]) -> "NDArray[np.float64]":
