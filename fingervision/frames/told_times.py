@@ -58,6 +58,10 @@ def believable(pictures: Iterable[Picture], *, is_damaged: bool) -> Iterator[Pic
                 yield held
             held = picture
             continue
+        if is_damaged and before is not None and _out_of_row(steps, held_tick - before, tick - held_tick):
+            yield _lost(held, OUT_OF_ROW)
+            held = picture
+            continue
         latest = held_tick if latest is None else max(latest, held_tick)
         if tick < latest:
             # The latest time is kept, so that following pictures must be later than this time.
@@ -65,12 +69,9 @@ def believable(pictures: Iterable[Picture], *, is_damaged: bool) -> Iterator[Pic
             held, before = _lost(picture, BACKWARDS), None
             steps.clear()
             continue
-        if is_damaged and before is not None and _out_of_row(steps, held_tick - before, tick - held_tick):
-            held = _lost(held, OUT_OF_ROW)
-        else:
-            if before is not None:
-                steps.append(held_tick - before)
-            before = held_tick
+        if before is not None:
+            steps.append(held_tick - before)
+        before = held_tick
         yield held
         held = picture
     if held is not None:
