@@ -277,7 +277,7 @@ class Section:
             return self.word(key, of=field.of or None)
         value = self._stated(key)
         if isinstance(value, dict) and self.uncertainties is not None:
-            value, u = self.uncertain(key, field)
+            value, u = self.uncertain(key, field, needs_u=True)
             if u is not None:
                 self.uncertainties[self.dotted(key)] = u
         return self._one(key, value, kind, field)
@@ -298,11 +298,11 @@ class Section:
             self.refuse(key, f"must be {words} numbers, but is {value!r}.")
         return array
 
-    def uncertain(self, key: str, field: Field) -> tuple[float, float | None]:
-        """Read a number, or `{ value, u }`: the number, and its standard uncertainty or None."""
+    def uncertain(self, key: str, field: Field, *, needs_u: bool = False) -> tuple[float, float | None]:
+        """Read a number, or `{ value, u }`: the number, and its standard uncertainty or None if it is not stated."""
         value, u = self._stated(key), None
         if isinstance(value, dict):
-            if not {"value"} <= set(value) <= {"value", "u"}:
+            if set(value) not in ({"value", "u"}, {"value"})[: 1 if needs_u else 2]:
                 self.refuse(key, f"must be a number or {{value = ..., u = ...}}, but has the keys {', '.join(value)}.")
             u = self._number(f"{key}.u", value["u"], Field(low=0.0)) if "u" in value else None
             value = value["value"]
