@@ -151,17 +151,18 @@ def _beside_reversals(data: Observations, explanation: Explanation) -> Problem:
 
     Its noise is white, with the median deviation of all other rows: the errors of the path are no noise.
     """
-    problem = problem_of(data, explanation)
-    residual_mm = np.split(data.stacked_mm - data.chain.stacked(explanation.values), len(data.channels))
-    shows = np.any(data.turn_columns_mm(explanation.values) != 0.0, axis=1)
-    aside = problem.whitener.aside & ~shows
-    elsewhere = ~shows[: residual_mm[0].size]
+    values = explanation.values
+    parts = np.split(data.stacked_mm - data.chain.stacked(values), len(data.channels))
+    shows = np.any(data.turn_columns_mm(values) != 0.0, axis=1)
+    aside = [
+        out & ~own for out, own in zip(data.outliers(parts, explained=True), np.split(shows, len(parts)), strict=True)
+    ]
+    elsewhere = ~shows[: parts[0].size]
     noises = tuple(
         Noise(max(TO_SD * float(np.median(np.abs(part[elsewhere]))) if elsewhere.any() else 0.0, floor, 1e-9), 0.0, 0.0)
-        for part, floor in zip(residual_mm, data.floors_mm, strict=True)
+        for part, floor in zip(parts, data.floors_mm, strict=True)
     )
-    whitener = replace(problem.whitener, noises=noises, aside=aside)
-    return problem.judged_by(whitener, data.aim_mm)
+    return data.judged_by(noises, aside, values)
 
 
 def _normal_equations(data: Observations, problem: Problem, explanation: Explanation) -> tuple[Array, Array]:

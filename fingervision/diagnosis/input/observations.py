@@ -16,7 +16,7 @@ from fingervision.diagnosis.input.driven_model import with_dynamics
 from fingervision.diagnosis.input.record_nuisances import TurningErrors
 from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
-from fingervision.diagnosis.noise.noise_model import gate, without_input
+from fingervision.diagnosis.noise.noise_model import Noise, gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.diagnosis.noise.whitening import Whitener
@@ -153,21 +153,38 @@ class Observations:
         self, residual_mm: Array, degrees: int, *, explained: bool, values: Mapping[str, Mapping[str, float]] = NOTHING
     ) -> Problem:
         """Estimate outliers and noise from the residual of an explanation, and whiten the measurement with them."""
-        history = self.chain.history
         for nuisance in (self.position_map, self.run_gains, self.roundings):
             residual_mm = residual_mm if nuisance is None else residual_mm - nuisance.fitted_mm
-        n, timed = history.input_mm.size, history.time_s is not None
-        sigmas = OUTLIER_SIGMAS if explained else None if timed and n < SHORT else RAW_SIGMAS
-        parts = [residual_mm[channel * n : (channel + 1) * n] for channel in range(len(self.channels))]
-        aside = [gate(part, history.input_mm, history.runs, timed, sigmas) | self.distrusted for part in parts]
+        parts = np.split(residual_mm, len(self.channels))
+        aside = self.outliers(parts, explained=explained)
         repeated = self.measured_pure_errors(aside)
         noises = (
-            channel_noises(history, parts, aside, self.floors_mm, degrees, explained=explained)
+            channel_noises(self.chain.history, parts, aside, self.floors_mm, degrees, explained=explained)
             if repeated is None
             else noises_of_repeats(repeated, self.floors_mm)
         )
+        return self.judged_by(noises, aside, values, known=repeated is not None)
+
+    def outliers(self, parts: list[Array], *, explained: bool) -> list[Flags]:
+        """Mark the rows of each channel's residual that are gross errors, each of shape (n,)."""
+        history = self.chain.history
+        timed = history.time_s is not None
+        short = timed and history.input_mm.size < SHORT
+        sigmas = OUTLIER_SIGMAS if explained else None if short else RAW_SIGMAS
+        return [gate(part, history.input_mm, history.runs, timed, sigmas) | self.distrusted for part in parts]
+
+    def judged_by(
+        self,
+        noises: tuple[Noise, ...],
+        aside: list[Flags],
+        values: Mapping[str, Mapping[str, float]],
+        *,
+        known: bool = False,
+    ) -> Problem:
+        """Whiten the measurement with given noises and outliers; `known` if repeats determine the noise."""
+        history = self.chain.history
         if history.both_edges:
-            aside[0] = aside[1] = aside[0] | aside[1]
+            aside = [aside[0] | aside[1]] * 2 + aside[2:]
         error = self.recorded.error_mm
         if np.median(error) < 0.1 * noises[0].total_mm / np.sqrt(max(self.recorded.samples, 1.0)) and not np.any(
             error > 0.3 * noises[0].total_mm
@@ -187,7 +204,7 @@ class Observations:
             drawing,
             self.runs_scatter_mm,
         )
-        share = SMALL_SHARE if repeated is None else FORM_SHARE_OF_RIGS
+        share = FORM_SHARE_OF_RIGS if known else SMALL_SHARE
         offsets = RunOffsets.of(whitener)
         mapped = 0.0
         if self.position_map is not None:

@@ -1,7 +1,5 @@
 """Ends of the range at which the reading stays constant while the command continues, because of a stop or contact."""
 
-from itertools import pairwise
-
 import numpy as np
 
 from fingervision.diagnosis.noise.replicates import resolution
@@ -34,7 +32,7 @@ def stalled_ends(input_mm: Array, predicted_mm: Array, gap_mm: Array) -> frozens
     changes = np.flatnonzero(np.abs(np.diff(gap)) > 0.5 * digit) + 1
     borders = np.concatenate([[0], changes, [gap.size]])
     rows = np.diff(borders)
-    motion = np.array([np.ptp(predicted[a:b]) for a, b in pairwise(borders)])
+    motion = np.maximum.reduceat(predicted, borders[:-1]) - np.minimum.reduceat(predicted, borders[:-1])
     found: frozenset[str] = frozenset()
     for end, word in ((0, "closed"), (rows.size - 1, "open")):
         others = np.arange(rows.size) != end

@@ -36,6 +36,10 @@ class Noise:
         """Standard deviation of the total noise of one sample (mm)."""
         return float(np.hypot(self.white_mm, self.correlated_mm))
 
+    def scaled(self, by: float) -> "Noise":
+        """Return noise of the same correlation, larger by a factor."""
+        return replace(self, white_mm=by * self.white_mm, correlated_mm=by * self.correlated_mm)
+
 
 MEDIAN_SAMPLES, FEWEST_SAMPLES = 7, 9
 """Number of samples of the running median, which a pair of outliers cannot change, and least number of samples of a run
@@ -72,7 +76,7 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
         out = np.abs(rest) > sigmas * sigma
         if ordered:
             there = _recurring(out, [*_places(input_mm), *_after_steps(input_mm, runs)])
-            for i in range(2, residual.size - 2):
+            for i in 2 + np.flatnonzero(np.convolve(out, np.ones(5))[4:-4] >= CROWDED):
                 if out[i - 2 : i + 3].sum() >= CROWDED:
                     out[i - 2 : i + 3] = False
             out &= ~there
@@ -134,5 +138,4 @@ def without_input(noise: Noise, input_mm: Array) -> Noise:
         Effect of each recorded input's error on the gap; it is accounted for separately from then on.
     """
     share = 1.0 - float(np.mean(input_mm**2)) / noise.total_mm**2
-    scale = float(np.sqrt(max(share, LEAST_SHARE)))
-    return replace(noise, white_mm=scale * noise.white_mm, correlated_mm=scale * noise.correlated_mm)
+    return noise.scaled(float(np.sqrt(max(share, LEAST_SHARE))))
