@@ -1,7 +1,6 @@
 """Compare a measured table with a model: where they disagree beyond the noise, without naming a cause."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -9,15 +8,16 @@ from fingervision.diagnosis.bodies.body_evidence import body_evidence, drawing_o
 from fingervision.diagnosis.bodies.place_diagnosis import without_places
 from fingervision.diagnosis.bodies.place_words import body_places
 from fingervision.diagnosis.inference.held_out_prediction import rms_mm
+from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.inference.plausibility import mistaken_column
-from fingervision.diagnosis.inference.verdict import isolated
+from fingervision.diagnosis.inference.verdict import isolated, limited_noises_mm
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.report.clock_words import within_clock
 from fingervision.diagnosis.report.residual_channels import by_channel, places
 from fingervision.diagnosis.report.sentences import EDGES
-from fingervision.domain.effect import Array, History
+from fingervision.domain.effect import Array
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Place
 from fingervision.models.corrected import CorrectedModel
@@ -25,9 +25,6 @@ from fingervision.models.corrected import CorrectedModel
 MOST_REFITS = 4
 """Most iterations of Newton's method for a drawing's uncertain dimensions; small changes of links and hinges need
 two."""
-
-PIECE_S, LEAST_PIECE = 1.0, 12
-"""Length of a straight piece in seconds, and least number of samples; only faster changes count as noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +41,8 @@ class Comparison:
         Regions, largest first.
     rms_mm, noise_mm : float
         RMS disagreement over all rows, of each finger's edge if both edges were measured, else of the gap; and an upper
-        bound of the noise of one gap reading. Fast changes of the disagreement count as noise here, so that this bound
-        is larger for a model that deviates more.
+        bound of the noise of one gap reading. Fast changes of the disagreement that no other pass repeats count as
+        noise here.
     counted_rms_mm : float
         RMS disagreement without the rows in `left_out`.
     left_out : tuple of int
@@ -94,34 +91,6 @@ class Comparison:
         }
 
 
-def rough(residual_mm: Array, history: History) -> Array:
-    """Residual minus straight segments from reversal to reversal in each run; same shape as the residual.
-
-    A jump at a reversal contains all frequencies, so that a spectrum would count it as noise.
-    """
-    n = history.input_mm.size
-    if history.time_s is None:
-        return residual_mm
-    rest = residual_mm.copy()
-    piece = max(LEAST_PIECE, round(PIECE_S / history.sample_time_s))
-    for run in history.runs:
-        way = np.sign(np.diff(history.input_mm[run], prepend=history.input_mm[run][0]))
-        turns = np.flatnonzero(np.diff(way)) + 1
-        ends = [0]
-        for turn in turns:
-            if turn - ends[-1] >= piece:
-                ends.append(int(turn))
-        ends.append(run.stop - run.start)
-        for start, stop in pairwise(ends):
-            at = np.arange(stop - start)
-            knots = np.linspace(0, max(1, stop - start - 1), 1 + max(1, (stop - start) // piece))
-            hats = np.maximum(0.0, 1.0 - np.abs(at[:, None] - knots) / (knots[1] - knots[0]))
-            for channel in range(residual_mm.size // n):
-                rows = slice(channel * n + run.start + start, channel * n + run.start + stop)
-                rest[rows] -= hats @ np.linalg.lstsq(hats, rest[rows], rcond=None)[0]
-    return rest
-
-
 def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Comparison:
     """Find where a measured table and a model disagree beyond the noise."""
     table, model = without_places(table, model)
@@ -145,8 +114,8 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
         if settled:
             break
     history = data.chain.history
-    # Nothing has been explained yet, so that changes of the disagreement over seconds must not count as noise.
-    problem = data.problem(rough(residual, history), 0, explained=False)
+    # Nothing has been explained yet, so that structure of the disagreement must not count as noise.
+    problem = _within_limits(data, data.problem(residual, 0, explained=False), residual)
     found = places(data, problem, residual, np.random.default_rng(seed))
     answers = drawing_of(model) if table.channels else None
     if answers is not None:
@@ -168,3 +137,12 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
         rms_mm(counted, int(np.sum(~aside)), both),
         tuple(np.flatnonzero(aside).tolist()),
     )
+
+
+def _within_limits(data: Observations, problem: Problem, residual_mm: Array) -> Problem:
+    """Reduce each channel's noise to what the fast changes and the repeated passes of the residual show."""
+    whitener = problem.whitener
+    errors = data.measured_pure_errors(np.split(whitener.aside, len(data.channels)))
+    limits = limited_noises_mm(data, problem, residual_mm, repeated=errors is not None)
+    noises = tuple(noise.scaled(limit / noise.total_mm) for noise, limit in zip(whitener.noises, limits, strict=True))
+    return problem.judged_by(replace(whitener, noises=noises), data.aim_mm)

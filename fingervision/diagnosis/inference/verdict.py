@@ -118,21 +118,8 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     history = data.chain.history
     n, both, runs = history.input_mm.size, history.both_edges, history.runs
     aside = isolated(after_mm[:n], problem.whitener.aside[:n], runs)
-    noises = [noise.total_mm for noise in problem.whitener.noises]
     errors = data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels)))
-    if history.commanded:
-        # The motion of the stage after each jump is not noise, but would count as noise in the spectrum.
-        parts = np.split(after_mm, len(data.channels))
-        digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
-        settled = [max(scatter_in_holds(history, part), digits) for part in parts]
-        noises = [min(noise, scatter or noise) for noise, scatter in zip(noises, settled, strict=True)]
-    elif history.time_s is not None and errors is None:
-        # Slow structure could count as correlated noise; true correlated noise is also visible in the changes from
-        # sample to sample.
-        parts = np.split(after_mm, len(data.channels))
-        digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
-        most = [most_noise(part, history.input_mm, runs, digits) for part in parts]
-        noises = [min(noise, limit or noise) for noise, limit in zip(noises, most, strict=True)]
+    noises = limited_noises_mm(data, problem, after_mm, repeated=errors is not None)
     if data.table.u_random_mm is not None:
         most_mm = TRUSTED * float(np.median(data.table.u_random_mm))
         noises[0] = min(noises[0], most_mm or noises[0])
@@ -158,6 +145,32 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     told = kept >= ENOUGH_ROWS or (kept >= FEWEST_ROWS and not resembling(gap_mm, history.input_mm[~aside]))
     known = stated or told
     return Standing(rms(before_mm), left_mm, noise, kept, degrees, rounding_mm, gross, left_out, known)
+
+
+def limited_noises_mm(data: Observations, problem: Problem, residual_mm: Array, *, repeated: bool) -> list[float]:
+    """Noise of each channel (mm), at most what the residual's fast changes, its holds and repeated passes show.
+
+    In a spectrum, slow structure, jumps, and the motion of the stage after a command could count as noise.
+
+    Parameters
+    ----------
+    data, problem : Observations, Problem
+        The measurement, and the noise estimated from it.
+    residual_mm : ndarray of float, shape (channels * n,)
+        Measured minus predicted values.
+    repeated : bool
+        Whether repeated readings determine the noise of readings at rest.
+    """
+    history, noises = data.chain.history, [noise.total_mm for noise in problem.whitener.noises]
+    digits = resolution(data.table.gap_mm) / float(np.sqrt(12.0))
+    parts = np.split(residual_mm, len(data.channels))
+    if history.commanded:
+        limits = [max(scatter_in_holds(history, part), digits) for part in parts]
+    elif history.time_s is not None and not repeated:
+        limits = [most_noise(part, history.input_mm, history.runs, digits) for part in parts]
+    else:
+        return noises
+    return [min(noise, limit or noise) for noise, limit in zip(noises, limits, strict=True)]
 
 
 def resembling(residual_mm: Array, input_mm: Array) -> bool:
