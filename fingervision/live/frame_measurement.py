@@ -10,6 +10,7 @@ from fingervision.live.choices import Choices
 from fingervision.live.live_camera import LiveCamera
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.sound_picture import SoundPictures
+from fingervision.measuring.temporal_filter import Lagging
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.pipeline import measure_frame
 
@@ -56,7 +57,7 @@ class FrameMeasurement:
         tell: Callable[[str], None] = lambda words: None,
     ) -> None:
         self._frame_size_px, self._files, self._fingers_are_dark = frame_size_px, files, fingers_are_dark
-        self._pictures, self._camera = SoundPictures(), LiveCamera(tell)
+        self._pictures, self._camera, self._lagging = SoundPictures(), LiveCamera(tell), Lagging()
 
     def measured(
         self, item: Frame | LostFrame, choices: Choices
@@ -96,4 +97,4 @@ class FrameMeasurement:
         outcome = self._pictures.judged(frame, measure_frame(frame, settings))
         if isinstance(outcome, GapMeasurement):
             self._camera.add(frame, settings, choices.task)
-        return outcome
+        return self._lagging.added(frame.index, outcome, settings.camera.lag)

@@ -25,7 +25,7 @@ from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.task import Task
-from fingervision.measuring.temporal_filter import with_lag
+from fingervision.measuring.temporal_filter import Lagging
 from fingervision.storage.beside import recorded_camera
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.lost_frames import lost_frames
@@ -263,7 +263,7 @@ def _outcomes(
     is_stopped: Callable[[], bool],
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Yield every frame with its result; the decoder runs ahead, and stops when this generator is closed."""
-    pictures = SoundPictures()
+    pictures, lagging = SoundPictures(), Lagging()
 
     def judged(frames: Iterable[Frame | LostFrame]) -> Iterator[Judged]:
         settings = replace(how.settings, camera=series.camera)
@@ -277,7 +277,8 @@ def _outcomes(
         first, series.camera = learnt_first(
             coded(frames, how.description.coding), how.settings, how.row_maker.scale, is_stopped
         )
-        yield from with_lag(in_sequence(judged(first)), series.camera.lag)
+        for item, outcome in in_sequence(judged(first)):
+            yield item, lagging.added(item.index, outcome, series.camera.lag)
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:
