@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from fingervision.cli._body_picture import draw_body, extent_mm, framed
-from fingervision.cli._mechanism_report import add_endurance, print_figures, say_endurance, warn
+from fingervision.cli._mechanism_report import add_endurance, print_figures, say_drawing, say_endurance, warn
 from fingervision.cli._model_grip import part_of_pair, write_pair_grip
 from fingervision.cli._model_motion import MotionAsked, move
-from fingervision.cli._model_sweep import sweep_mechanism
+from fingervision.cli._model_sweep import solve_mechanism, sweep_mechanism
 from fingervision.cli._model_uncertainty import write_uncertainty
 from fingervision.domain.errors import ArgumentError, FingervisionError, InstallationError, OutputError, UsageError
 from fingervision.models.elastic_mechanism import MechanismState
@@ -165,6 +165,7 @@ def predict(
     out: Path,
     asked: MotionAsked,
     vary: tuple[str, ...],
+    solve: tuple[tuple[str, ...], tuple[str, ...]],
     *,
     object_mm: float | None,
     object_n_mm: float | None,
@@ -180,6 +181,9 @@ def predict(
     drawing = read_drawing(path)
     if vary:
         sweep_mechanism(drawing, vary, out, as_json=as_json)
+        return
+    if any(solve):
+        solve_mechanism(drawing, *solve, out, as_json=as_json)
         return
     with _naming(path):
         mechanism = drawing.mechanism()
@@ -212,8 +216,8 @@ def predict(
         add_endurance(mechanism, rows, table[name])
     write_figures(table, out / "models.csv")
     print_figures(mechanism.name, table, as_json=as_json)
-    for driven_face in mechanism.drives if not as_json else ():
-        click.echo(driven_face.words)
+    if not as_json:
+        say_drawing(mechanism)
     if drawing.estimates:
         spread = mechanism_uncertainty(drawing.mechanism, drawing.estimates)
         write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)

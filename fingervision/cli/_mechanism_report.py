@@ -10,10 +10,24 @@ from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.gripper_figures import Endurance, endurance, unit_of
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import MechanismModel
+from fingervision.models.strips import necks_of
 
+_MOST_NECKS = 3
 _APART = 0.1
 """Relative difference of two kinds of model, beyond their stated errors, from which a message is printed (a
 requirement)."""
+
+
+def say_drawing(mechanism: Mechanism) -> None:
+    """Print which parts are treated as flexures although the drawing does not name them, and what its drives do."""
+    for strip in mechanism.strips:
+        x, y = strip.at_mm
+        click.echo(
+            f"{strip.name} at ({x:.4g}, {y:.4g}) mm, {strip.thickness_mm:.4g} mm thick and "
+            f"{2.0 * strip.half_length_mm:.4g} mm long, is treated as a flexure: it is much thinner than what it joins."
+        )
+    for drive in mechanism.drives:
+        click.echo(drive.words)
 
 
 def print_figures(name: str, table: dict[str, dict[str, float]], *, as_json: bool) -> None:
@@ -39,6 +53,12 @@ def warn(
             f"Warning: the stress is not stated, because the outline has a re-entrant corner without a radius at "
             f"({corner[0]:.4g}, {corner[1]:.4g}) mm, where it has no limit: round the corner, or draw the thin strip "
             "there as a [[flexure]].",
+            err=True,
+        )
+    for (x, y), thickness in necks_of(mechanism.region, mechanism.flexures)[:_MOST_NECKS]:
+        click.echo(
+            f"Warning: the drawing is only {thickness:.3g} mm thick at ({x:.4g}, {y:.4g}) mm, where it names no "
+            "flexure: move the shapes apart there, or draw the neck as a [[flexure]], as its stress is not judged.",
             err=True,
         )
     worst = max(states, key=lambda state: state.stress_mpa)

@@ -1,7 +1,9 @@
-"""`fingervision model --vary`: a table and a plot of the results over one or more dimensions of the drawing."""
+"""`fingervision model --vary` and `--solve`: results over dimensions of the drawing, and dimensions for results."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from operator import attrgetter
 from pathlib import Path
 
 import click
@@ -13,14 +15,20 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
+from fingervision.models.finite_element import FiniteElementGripper, MechanismPlate
 from fingervision.models.gripper_figures import label_of, unit_of
 from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.inverse_design import Figures, parse_unknown, parse_wanted, solve_dimensions
+from fingervision.models.lumped import LumpedGripper, MechanismFrame
+from fingervision.models.mechanism_figures import response_figures
 from fingervision.models.parameter_sweep import (
     COLUMNS,
     Variation,
     mechanism_sweep_answers,
     parse_variation,
     sweep_answers,
+    sweep_figures,
+    varied,
 )
 from fingervision.storage.mechanism_toml import MechanismDrawing
 from fingervision.storage.out_folder import out_folder
@@ -47,6 +55,60 @@ def sweep_mechanism(drawing: MechanismDrawing, texts: tuple[str, ...], out: Path
         lambda changes: drawing.mechanism(changes, absolute=True), variations
     )
     _write(drawing.mechanism().name, variations, values, columns, answers, out, as_json=as_json)
+
+
+def solve(gripper: Gripper, texts: tuple[str, ...], wanted: tuple[str, ...], out: Path, *, as_json: bool) -> None:
+    """Find dimensions of a gripper for which its figures take wanted values; write solve.csv and print it."""
+
+    def redrawn_to(values: Mapping[str, float]) -> Gripper:
+        return varied(gripper, [Variation(name, ()) for name in values], tuple(values.values()))
+
+    def drawn(name: str) -> float:
+        varied(gripper, [Variation(name, ())], (0.0,))  # refuses what is no number of the drawing
+        return float(attrgetter(name)(gripper))
+
+    _solve(
+        texts, wanted, out, drawn,
+        lambda values: sweep_figures(LumpedGripper(redrawn_to(values))),
+        lambda values: sweep_figures(FiniteElementGripper(redrawn_to(values))), as_json=as_json,
+    )  # fmt: skip
+
+
+def solve_mechanism(
+    drawing: MechanismDrawing, texts: tuple[str, ...], wanted: tuple[str, ...], out: Path, *, as_json: bool
+) -> None:
+    """Find dimensions of a mechanism for which its figures take wanted values; write solve.csv and print it."""
+
+    def model(kind: type[MechanismFrame | MechanismPlate], values: Mapping[str, float]) -> dict[str, float]:
+        return response_figures(kind(drawing.mechanism(values, absolute=True)))
+
+    kind = MechanismFrame if drawing.mechanism().flexures else MechanismPlate
+    _solve(texts, wanted, out, drawing.value, partial(model, kind), partial(model, MechanismPlate), as_json=as_json)
+
+
+def _solve(
+    texts: tuple[str, ...], wanted: tuple[str, ...], out: Path, drawn: Callable[[str], float], lumped: Figures,
+    elements: Figures, *, as_json: bool,
+) -> None:  # fmt: skip
+    as_drawn = dict(elements({}))
+    unknowns = [parse_unknown(text, drawn) for text in texts]
+    targets = parse_wanted(wanted, as_drawn)
+    found = solve_dimensions(unknowns, targets, lumped, lambda values: elements(values) if values else as_drawn)
+    rows = [(name, drawn(name), value) for name, value in found.values.items()]
+    rows += [(name, value, found.found.get(name, np.nan)) for name, value in found.drawn.items()]
+    lines = ["name,drawn,solved", *(f"{name},{before:.7g},{after:.7g}" for name, before, after in rows)]
+    with out_folder(out):
+        (out / "solve.csv").write_text("\n".join(lines).replace("nan", "").replace("-inf", "") + "\n", encoding="utf-8")
+    if as_json:
+        click.echo(json.dumps({name: {"drawn": a, "solved": b} for name, a, b in rows}, indent=2))
+        return
+    asked = ", ".join(f"{name} = {value:.6g}" for name, value in targets.items())
+    dimensions = ", ".join(f"{name} = {v:.6g} {number_unit(name)}" for name, v in found.values.items())
+    click.echo(f"{dimensions} gives {asked}, by finite elements within 0.1 %. What changes with it:")
+    width = max(len(name) for name, _, _ in rows)
+    for name, before, after in rows:
+        change = f"{100.0 * (after / before - 1.0):+.3g} %" if before and np.isfinite([before, after]).all() else ""
+        click.echo(f"{name:<{width}}  {before:>10.5g}  {after:>10.5g}  {change}")
 
 
 def number_unit(name: str) -> str:

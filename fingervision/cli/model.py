@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fingervision.domain.response import Response
     from fingervision.models.answer_figures import ModelFigures
 
-_SWEPT = ("vary.csv", "vary.png")
+_SWEPT = ("vary.csv", "vary.png", "solve.csv")
 _PREDICTED = (
     "models.csv", "models.png", "simulation.csv", "mechanism.csv", "deformed.png", "mesh.png", "modes.csv", "modes.png",
     "frequency.csv", "frequency.png", "grip.csv", "grip.png", "response.csv", "response.png", "uncertainty.csv",
@@ -35,6 +35,7 @@ Examples:
   fingervision model gripper.toml --kind lumped --object-mm 3 --object-n-mm 50
   fingervision model gripper.toml --kind lumped --frequency 1:500 --modes 500Hz --film
   fingervision model mechanism.toml --vary lengths.t=0.2:0.4:5
+  fingervision model gripper.toml --solve lever.l2_mm=16:20 --for gap_per_input=8
   fingervision model mechanism.toml --large-rotation --mesh --out stage
 """
 
@@ -76,6 +77,22 @@ Examples:
     group=ASKED,
     help="Vary one number of the drawing over N values from A to B (repeatable: a grid); write vary.csv and vary.png, "
     "computed by the lumped model.",
+)
+@option(
+    "--solve",
+    multiple=True,
+    metavar="NAME[=A:B]",
+    group=ASKED,
+    help="Find the value between A and B of a number of the drawing for which a figure takes the value of --for; write "
+    "solve.csv (repeatable).",
+)
+@option(
+    "--for",
+    "wanted",
+    multiple=True,
+    metavar="FIGURE=VALUE",
+    group=ASKED,
+    help="With --solve: wanted value of a figure of models.csv, such as gap_per_input=8; one for each --solve.",
 )
 @option(
     "--modes",
@@ -145,6 +162,8 @@ def command(
     object_n_mm: float | None,
     mesh: bool,
     vary: tuple[str, ...],
+    solve: tuple[str, ...],
+    wanted: tuple[str, ...],
     as_json: bool,
 ) -> None:
     """Predict gap, force, stress and vibration from a drawing, with one kind of model or all kinds.
@@ -175,14 +194,20 @@ def command(
         from fingervision.cli._mechanism import predict
 
         predict(
-            gripper_toml, kind, drive, columns, out, asked, vary,
+            gripper_toml, kind, drive, columns, out, asked, vary, (solve, wanted),
             object_mm=object_mm, object_n_mm=object_n_mm, large_rotation=large_rotation, contact=contact, mesh=mesh,
             as_json=as_json,
         )  # fmt: skip
-        finish_in(out, gripper_toml, _SWEPT if vary else _PREDICTED, began_ns)
+        finish_in(out, gripper_toml, _SWEPT if vary or solve or wanted else _PREDICTED, began_ns)
         return
     gripper = read_gripper(gripper_toml)
     part = part_asked(object_mm, object_n_mm, gripper.body.rest_gap_mm)
+    if solve or wanted:
+        from fingervision.cli._model_sweep import solve as solve_gripper
+
+        solve_gripper(gripper, solve, wanted, out, as_json=as_json)
+        finish_in(out, gripper_toml, _SWEPT, began_ns)
+        return
     if vary:
         from fingervision.cli._model_sweep import sweep
 

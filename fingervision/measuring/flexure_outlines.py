@@ -81,7 +81,7 @@ def flexure_outline(picture: StillPicture, flexure: Flexure) -> Measured:
     reach = REACH.get(flexure.kind, REACH_OF_NOTCH) * flexure.half_length_mm
     along = np.linspace(-reach, reach, STATIONS)
     drawn = flexure.height_mm(along)
-    beside = BESIDE_PX * mm if flexure.kind == "leaf" else min(BESIDE_PX * mm, 0.8 * flexure.depth_mm)
+    beside = min(BESIDE_PX * mm, 0.8 * flexure.depth_mm) if flexure.depth_mm else BESIDE_PX * mm
     if beside < LEAST_BESIDE_PX * mm:
         return None
     heights, middles = np.empty(STATIONS), np.empty(STATIONS)

@@ -23,9 +23,15 @@ from fingervision.models.condensed_bodies import (
 )
 from fingervision.models.corotational_frame import CorotationalBody, turned_axes
 from fingervision.models.flexure_span import FlexureSpan
-from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism import Face, Mechanism
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
-from fingervision.models.mechanism_faces import driven_components, moves_in_the_mean, nodes_on, supports_of
+from fingervision.models.mechanism_faces import (
+    drive_weights,
+    driven_components,
+    moves_in_the_mean,
+    nodes_on,
+    supports_of,
+)
 from fingervision.models.plane_stress import PlaneStressPlate
 
 Array = NDArray[np.float64]
@@ -141,15 +147,20 @@ class _Frames:
         self.owner.append(body)
         return 3 * len(self.found) - 3
 
-    def face(self, nodes: Indices, tied: tuple[str, ...]) -> list[tuple[int, bool]]:
+    def face(self, nodes: Indices, tied: tuple[str, ...], driven: Face | None = None) -> list[tuple[int, bool]]:
         """Add the coordinate frames of a face, one for each body that the face touches.
 
         Return, for each coordinate frame, the index of its first motion and whether the face's tied components prevent
         rotation.
         """
         added = []
-        for body in np.unique(self.piece[nodes]).tolist():
-            frame, turns = face_frame(self.plate, nodes[self.piece[nodes] == body], tied, self._taken)
+        pieces = np.unique(self.piece[nodes]).tolist()
+        if driven is not None and driven.is_pin and len(pieces) > 1:
+            raise ModelError(f"pin {driven.name} of {self.mechanism.name} must lie on one body, but touches several.")
+        for body in pieces:
+            own = nodes[self.piece[nodes] == body]
+            weights = None if driven is None else drive_weights(self.plate, own, driven)
+            frame, turns = face_frame(self.plate, own, tied, self._taken, weights)
             added.append((self.add(frame, body), turns))
         return added
 
@@ -164,7 +175,7 @@ class _Frames:
             kept = driven_components(drive)
             own: dict[int, float] = {}
             in_the_mean = moves_in_the_mean(self.plate, nodes, drive)
-            for at, turns in self.face(nodes, () if in_the_mean else kept):
+            for at, turns in self.face(nodes, () if in_the_mean else kept, drive.face):
                 own |= {at + "xy".index(c): drive.direction["xy".index(c)] for c in kept}
                 own |= {at + 2: 0.0} if turns or drive.turns == "held" else {}
             self.by_drive.append(own)
@@ -287,8 +298,13 @@ def frame_vibration(
             lambda forces: csr_matrix(block_diag([bend(forces), csr_matrix((more, more))])),
         )
 
+    actuators = driven.actuators
+    if actuators is not None:
+        rows = np.vstack([actuators.rows, np.zeros((more, actuators.rows.shape[1]))])
+        actuators = replace(actuators, rows=rows)
     return inner, replace(
         driven,
+        actuators=actuators,
         tangent=tangent,
         internal=lambda moved: tangent(moved)[1],
         motions=csr_matrix(block_diag([driven.motions, identity(more)])),

@@ -118,7 +118,9 @@ def _row(plate: PlaneStressPlate, x_part: Array, y_part: Array) -> Array:
     return row
 
 
-def face_frame(plate: PlaneStressPlate, nodes: Indices, tied: Sequence[str], taken: set[int]) -> tuple[Frame, bool]:
+def face_frame(
+    plate: PlaneStressPlate, nodes: Indices, tied: Sequence[str], taken: set[int], weights: Array | None = None
+) -> tuple[Frame, bool]:
     """Coordinate frame of a face whose nodes follow one component, or both components, of a rigid motion.
 
     Parameters
@@ -132,6 +134,8 @@ def face_frame(plate: PlaneStressPlate, nodes: Indices, tied: Sequence[str], tak
         motion of the nodes follows the frame.
     taken : set of int
         Unknowns that are already tied to another face; the unknowns of this face are added to the set.
+    weights : ndarray of float, shape (k,), or None
+        Weights of the nodes in the face's mean motion; None for those of a uniform load.
 
     Returns
     -------
@@ -139,7 +143,8 @@ def face_frame(plate: PlaneStressPlate, nodes: Indices, tied: Sequence[str], tak
         The frame, and whether the tied components keep the face from turning.
     """
     places = plate.nodes_mm[:, nodes]
-    at_mm = places.mean(axis=1)
+    # A drive prescribes the face's mean motion, which is that of a rigid face at its weighted middle.
+    at_mm = places.mean(axis=1) if weights is None else places @ weights / weights.sum()
     arms = places - at_mm[:, None]
     extent = float(np.hypot(*arms).max())
     found: list[tuple[dict[int, float], list[float]]] = []
@@ -151,7 +156,7 @@ def face_frame(plate: PlaneStressPlate, nodes: Indices, tied: Sequence[str], tak
                 taken.add(dof)
                 found.append(({dof: 1.0}, [float(component == "x"), float(component == "y"), lever]))
     held = turns = any(np.abs(levers[component]).max() > _LEVER * extent for component in tied)
-    weights = mean_weights(plate, nodes)
+    weights = mean_weights(plate, nodes) if weights is None else weights
     for component in sorted({"x", "y"} - set(tied)):
         own, lever = dofs[component].tolist(), levers[component]
         mean = dict(zip(own, weights.tolist(), strict=True))

@@ -50,6 +50,8 @@ class MechanismState:
         Force at every driven face, along its direction.
     stress_place_mm : (float, float)
         Position of the largest stress at rest.
+    faces_mm : mapping of str to float
+        Motion of every driven face, along its direction; less than the input where an actuator yields.
     """
 
     input_mm: float
@@ -62,6 +64,7 @@ class MechanismState:
     bodies: Mapping[str, BodyPose] = field(default_factory=lambda: MappingProxyType({}))
     drives_n: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     stress_place_mm: PointMm = (0.0, 0.0)
+    faces_mm: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +83,9 @@ class LargestStress:
     place_mm: PointMm
 
 
-def named_forces_n(mechanism: Mechanism, forces_n: Array) -> dict[str, float]:
-    """Forces of the driven faces (N), by the names of the faces."""
-    return {drive.face.name: float(force) for drive, force in zip(mechanism.drives, forces_n, strict=True)}
+def named_by_drive(mechanism: Mechanism, values: Array) -> dict[str, float]:
+    """Values of the driven faces, such as their forces (N), by the names of the faces."""
+    return {drive.face.name: float(value) for drive, value in zip(mechanism.drives, values, strict=True)}
 
 
 def pair_distances_mm(
@@ -244,8 +247,9 @@ class ElasticMechanism(ABC):
             moved,
             pressed,
             self.poses(moved, large=large),
-            named_forces_n(mechanism, found.drives_n),
+            named_by_drive(mechanism, found.drives_n),
             stress.place_mm,
+            named_by_drive(mechanism, self.driven.face_motions(moved, input_mm)),
         )
 
     def probes_mm(self, moved: Array, *, large: bool) -> dict[str, tuple[float, float]]:
@@ -317,8 +321,23 @@ class ElasticMechanism(ABC):
             mass_t=float(static @ inertia),
             rad_s=rad_s,
             participation=shapes.T @ inertia,
+            face_per_input=self._face_per_input,
+            force_share=self._force_share,
             observed=observables(self.mechanism, self.probes_by(np.column_stack([static, shapes]))),
         )
+
+    @property
+    def _face_per_input(self) -> float:
+        """Motion of the driven faces per 1 mm of input, weighted by their `per_input`; 1 for a stage."""
+        system = self.driven
+        moved = system.face_motions(system.unit_displacement, 1.0)
+        return float(system.per_input @ moved) / float(system.per_input @ system.per_input)
+
+    @property
+    def _force_share(self) -> float:
+        """Spring over push of a soft actuator, by which vibration changes its force; 1 for a stage."""
+        soft = [drive.spring_n_mm / drive.push_n for drive in self.mechanism.drives if drive.is_soft]
+        return soft[0] if soft else 1.0
 
     def free_modes(self, count: int) -> FreeModes:
         """Return the vibration modes with the drive free to move along its direction."""

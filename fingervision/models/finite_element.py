@@ -31,11 +31,12 @@ from fingervision.models.mechanism_equilibrium import DrivenMechanism
 from fingervision.models.mechanism_faces import (
     ContactPair,
     contact_pair,
+    drive_weights,
     driven_components,
-    mean_weights,
     moves_in_the_mean,
     per_input_of,
     supports_of,
+    with_actuators,
 )
 from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, OutOfPlane, out_of_plane
 from fingervision.models.physics import LINEAR, Physics
@@ -129,12 +130,15 @@ class MechanismPlate(ElasticMechanism):
         held = [dofs[component][nodes] for nodes in supports.fixed for component in "xy"]
         held += [dofs[component][nodes] for nodes, component in supports.slides]
         self._by_drive = np.zeros((plate.unknowns, len(mechanism.drives)))
+        self._drive_rows = np.zeros_like(self._by_drive)
         motions = identity(plate.unknowns, format="csc")
-        for column, (drive, nodes) in zip(self._by_drive.T, zip(mechanism.drives, supports.driven, strict=True),
-                                          strict=True):  # fmt: skip
+        for place, (drive, nodes) in enumerate(zip(mechanism.drives, supports.driven, strict=True)):
+            column, own_row = self._by_drive[:, place], self._drive_rows[:, place]
             driven = driven_components(drive)
+            main = int(np.argmax(np.abs(drive.direction)))
+            own_row[dofs["xy"[main]][nodes]] = drive_weights(plate, nodes, drive.face) / drive.direction[main]
             if moves_in_the_mean(plate, nodes, drive):
-                weights = mean_weights(plate, nodes)
+                weights = drive_weights(plate, nodes, drive.face)
                 wanted = [(c, weights, drive.direction["xy".index(c)]) for c in driven]
                 if drive.turns == "held":
                     across = "yx"["xy".index(driven[0])]
@@ -169,11 +173,12 @@ class MechanismPlate(ElasticMechanism):
         if self._wanders():
             raise ModelError(f"{self.mechanism.name} must be held by its fixed faces, but can move freely.")
         plate = self.plate
-        return DrivenMechanism(
+        system = DrivenMechanism(
             self.mechanism.name, plate.internal_force_n, plate.nodal_force_n, self._motions, self._by_drive,
             per_input_of(self.mechanism), lambda: plate.mass_t,
             tuple(partial(pair.gaps_mm, plate) for pair in self._pairs),
         )  # fmt: skip
+        return with_actuators(system, self._drive_rows, self.mechanism)
 
     def _wanders(self) -> bool:
         """Whether the supports allow a rigid motion of the whole mechanism."""

@@ -144,7 +144,7 @@ def _shifted(degree: int) -> Array:
     return found
 
 
-FlexureKind = Literal["circular", "elliptic", "filleted", "leaf"]
+FlexureKind = Literal["circular", "elliptic", "filleted", "leaf", "strip"]
 _HEIGHT_THAT_BENDS = 0.13
 """Largest height that a fillet adds on either side, in thicknesses, for a section that still counts as bending: such a
 section is 1.26 times as high as the neck and twice as stiff in bending."""
@@ -163,7 +163,8 @@ class Flexure:
         Name of the flexure in messages.
     kind : str
         `circular` and `elliptic`: two discs or ellipses cut into the body; `filleted`: two slots with rounded corners
-        cut into the body; `leaf`: a thin bar added between bodies.
+        cut into the body; `leaf`: a thin bar added between bodies; `strip`: a thin strip that the bodies and cuts of
+        the drawing leave (`strips`).
     at_mm : (float, float)
         Centre of the flexure.
     axis_deg : float
@@ -202,6 +203,8 @@ class Flexure:
     def steps(self) -> list[tuple[bool, Shape]]:
         """Shapes that the flexure adds to the drawing's region or removes from it."""
         half = 0.5 * self.thickness_mm
+        if self.kind == "strip":
+            return []
         if self.kind == "leaf":
             ends = (*self.point_mm(-self.half_length_mm, 0.0), *self.point_mm(self.half_length_mm, 0.0))
             return [(True, bar(*ends, self.thickness_mm))]

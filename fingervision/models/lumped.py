@@ -25,7 +25,13 @@ from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import BodyPose, LinkBody, bodies_of, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
-from fingervision.models.mechanism_faces import ContactNodes, ContactPair, contact_pair, per_input_of
+from fingervision.models.mechanism_faces import (
+    ContactNodes,
+    ContactPair,
+    contact_pair,
+    per_input_of,
+    with_actuators,
+)
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_stress import PlaneStressPlate
@@ -126,6 +132,14 @@ class MechanismFrame(ElasticMechanism):
                 f"{mechanism.name} must have flexures to be a lumped model, but has none; take --kind finite_element."
             )
         self.spans = tuple(span_of(flexure, region) for flexure in mechanism.flexures)
+        for drive in mechanism.drives:
+            middle = np.array(drive.face.middle_mm)[:, None]
+            on = [span.flexure.name for span in self.spans if drive.face.is_pin and span.slab.holds(middle)[0]]
+            if on:
+                raise ModelError(
+                    f"pin {drive.face.name} of {mechanism.name} must lie on a body to be driven in a lumped model, but "
+                    f"lies on flexure {on[0]}; take --kind finite_element."
+                )
         cut = PlanarRegion((*region.steps, *((False, span.slab) for span in self.spans)), region.marks_mm)
         self._mesh = mesh or triangulate(cut, _ACROSS, _BODY * region.size_mm)
         self._size_mm = region.size_mm
@@ -211,11 +225,16 @@ class MechanismFrame(ElasticMechanism):
         if np.linalg.matrix_rank(whole.reshape(3, -1)[:, held], tol=_SAME_PLACE) < _RIGID_MOTIONS:
             raise ModelError(f"{self.mechanism.name} must be held by its fixed faces, but can move freely.")
         every = identity(self.frame.unknowns, format="csc")
-        return DrivenMechanism(
+        system = DrivenMechanism(
             self.mechanism.name, self._tangent, lambda moved: self._tangent(moved)[1], csr_matrix(every[:, self.free]),
             self.by_drive, per_input_of(self.mechanism), self._no_mass,
             tuple(self._gaps_of(*ends) for ends in self._contact_ends),
         )  # fmt: skip
+        # A face's motion is that of its coordinate frame, in the component in which the drive moves it most.
+        main = np.argmax(np.abs(self.by_drive), axis=0)
+        rows, drives = np.zeros_like(self.by_drive), np.arange(main.size)
+        rows[main, drives] = 1.0 / self.by_drive[main, drives]
+        return with_actuators(system, rows, self.mechanism)
 
     def _no_mass(self) -> csr_matrix:
         raise NotImplementedError("The frames' masses need the bodies' own modes: see `vibrating`.")

@@ -29,10 +29,20 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """A face of the body: the nodes of the outline inside a box with sides parallel to x and y (mm)."""
+    """A face of the body: the nodes of the outline inside a box with sides parallel to x and y (mm).
+
+    A pin (`is_pin`) is instead the part of the body, on its outline or inside it, within the largest circle in the box.
+    """
 
     name: str
     box_mm: tuple[float, float, float, float]
+    is_pin: bool = False
+
+    @property
+    def middle_mm(self) -> PointMm:
+        """Middle of the box."""
+        x0, x1, y0, y1 = self.box_mm
+        return 0.5 * (x0 + x1), 0.5 * (y0 + y1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +64,12 @@ class Drive:
         Rotation of the face: `free` for a rod or a pin, which moves the face in the mean, with a force spread evenly
         over it, while the face may turn and bend; `held` for a clamp or a flat plate, with which every point of the
         face moves alike.
+    stiffness_n_mm : float or None
+        Stiffness of the actuator between its own motion, which is the input, and the face; None for a stage, whose
+        stiffness counts as infinite.
+    force_n_per_input : float or None
+        Force of the actuator at rest per unit of input, for an actuator that prescribes a force (a voice coil, a
+        weight); None for one that prescribes a motion. With a stiffness, the force decreases by it as the face moves.
     """
 
     face: Face
@@ -61,17 +77,49 @@ class Drive:
     across: Literal["held", "free"]
     per_input: float = 1.0
     turns: Literal["held", "free"] = "held"
+    stiffness_n_mm: float | None = None
+    force_n_per_input: float | None = None
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether the face moves less than the input, because the actuator yields or prescribes a force."""
+        return self.stiffness_n_mm is not None or self.force_n_per_input is not None
+
+    @property
+    def spring_n_mm(self) -> float:
+        """Decrease of the actuator's force per 1 mm of its face, for a soft drive (N/mm)."""
+        return self.stiffness_n_mm or 0.0
+
+    @property
+    def push_n(self) -> float:
+        """Force of a soft drive per unit of input, with its face at rest (N)."""
+        return self.spring_n_mm if self.force_n_per_input is None else self.force_n_per_input
 
     @property
     def words(self) -> str:
-        """Sentence on what the driven face may do."""
+        """Sentence on what the driven face may do, and on its actuator."""
+        force, stiff = self.force_n_per_input, self.stiffness_n_mm
+        actuator = ""
+        if force is not None:
+            less = "" if stiff is None else f", less {stiff:g} N per mm that it moves"
+            actuator = f" A unit of input is a force of {force:g} N on the face{less}."
+        elif stiff is not None:
+            actuator = f" The input is the actuator's own motion, behind a stiffness of {stiff:g} N/mm."
+        if self.face.is_pin:
+            slides = "may slide" if self.across == "free" else "cannot slide"
+            x, y = self.face.middle_mm
+            return (
+                f"The drive {self.face.name} acts at ({x:g}, {y:g}) mm as by a pin of {self.face.box_mm[1] - x:g} mm "
+                f"radius: the body there moves in the mean, may turn, and {slides} across the drive "
+                f'(across = "{self.across}").{actuator}'
+            )
         how = {
             ("free", "free"): "is pushed as by a rod: it moves by the input in the mean, and may slide, turn and bend",
             ("free", "held"): "is pushed as by a flat plate: every point moves by the input, and may slide",
             ("held", "free"): "is moved as by a pin: it moves by the input in the mean, and may turn and bend",
             ("held", "held"): "is clamped to a stage: every point moves by the input, and cannot slide or turn",
         }[self.across, self.turns]
-        return f'The driven face {self.face.name} {how} (across = "{self.across}", turns = "{self.turns}").'
+        return f'The driven face {self.face.name} {how} (across = "{self.across}", turns = "{self.turns}").{actuator}'
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +207,11 @@ class Mechanism:
         return replace(self, slides=tuple((face, "y") for face, _ in self.slides), drives=())
 
     @property
+    def strips(self) -> tuple[Flexure, ...]:
+        """Flexures that the drawing does not name, but its bodies and cuts leave."""
+        return tuple(flexure for flexure in self.flexures if flexure.kind == "strip")
+
+    @property
     def width_error(self) -> float:
         """Relative uncertainty of the force because the restraint of the flexures by the plate's width is uncertain."""
         doubt = max((flexure.width_doubt(self.plate_mm) for flexure in self.flexures), default=0.0)
@@ -170,7 +223,7 @@ class Mechanism:
         steps = (*self.bodies, *(step for flexure in self.flexures for step in flexure.steps()))
         faces = [*self.fixed, *(face for face, _ in self.slides), *(drive.face for drive in self.drives)]
         faces += [face for contact in self.contacts for face in (contact.face, contact.other) if face is not None]
-        return PlanarRegion(steps, _ends_of(steps, tuple(face.box_mm for face in faces)))
+        return PlanarRegion(steps, _ends_of(steps, tuple(face.box_mm for face in faces if not face.is_pin)))
 
 
 @lru_cache(maxsize=64)
@@ -222,7 +275,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         inside = np.array([flexure.point_mm(0.0, s * t * 0.49) for s in (-1.0, 0.0, 1.0)]).T
         beside = np.array([flexure.point_mm(0.0, s * (0.5 * t + 1e-3 * t)) for s in (-1.0, 1.0)]).T
         # A flexure that is cut from a body must have had material beside its neck before the cut.
-        cuts = flexure.kind == "leaf" or uncut.holds(beside).all()
+        cuts = flexure.kind in ("leaf", "strip") or uncut.holds(beside).all()
         if not region.holds(inside).all() or region.holds(beside).any() or not cuts:
             raise DataError(
                 f"flexure {flexure.name} of {name} must have a thickness of {t:g} mm at ({flexure.at_mm[0]:g}, "
@@ -245,11 +298,22 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
                     f"flexures {other.name} and {flexure.name} of {name} must be apart, but overlap; remove "
                     "or move one of them."
                 )
+    _check_points(mechanism, region)
+
+
+def _check_points(mechanism: Mechanism, region: PlanarRegion) -> None:
+    """Check that probes and pins lie on the body, and that faces are finite."""
+    name, size = mechanism.name, region.size_mm
     for probe, (x, y) in mechanism.probes.items():
         x = abs(x) if mechanism.mirrored else x
         ring = np.array([[x + 1e-6 * size * dx, y + 1e-6 * size * dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)]).T
         if not region.holds(ring).any():
             raise DataError(f"probe {probe} of {name} must lie on the body, but ({x:g}, {y:g}) mm is outside it.")
+    for drive in mechanism.drives:
+        x, y = drive.face.middle_mm
+        near = 1e-6 * size * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])
+        if drive.face.is_pin and not region.holds(np.array([[x], [y]]) + near).any():
+            raise DataError(f"pin {drive.face.name} of {name} must lie on the body, but ({x:g}, {y:g}) mm is outside.")
     for face in (*mechanism.fixed, *(drive.face for drive in mechanism.drives)):
         if hypot(*face.box_mm) > 1e6:
             raise DataError(f"face {face.name} of {name} must have a box_mm with finite limits.")

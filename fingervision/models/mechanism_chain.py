@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import ModelError
-from fingervision.models.elastic_mechanism import MechanismState, named_forces_n, pair_distances_mm
+from fingervision.models.elastic_mechanism import MechanismState, named_by_drive, pair_distances_mm
 from fingervision.models.flexure_span import FlexureSpan, span_of
 from fingervision.models.flexure_stress import nominal_stress
 from fingervision.models.hinge_correction import HingeTheory
@@ -85,6 +85,8 @@ class MechanismChain:
         return first, last
 
     def _touching(self, face: Face) -> set[int]:
+        if face.is_pin:
+            return {self._body_of(np.array(face.middle_mm), f"pin {face.name}")}
         x0, x1, y0, y1 = face.box_mm
         near = _ON * self._size_mm
         found = set()
@@ -96,6 +98,8 @@ class MechanismChain:
 
     def _middle_mm(self, face: Face) -> Array:
         """Middle of the part of the outline in a face's box, at which its force acts."""
+        if face.is_pin:
+            return np.array(face.middle_mm)
         x0, x1, y0, y1 = face.box_mm
         near, moment, length = _ON * self._size_mm, np.zeros(2), 0.0
         for curve in (curve for loop in self._bodies for curve in loop.curves):
@@ -170,6 +174,13 @@ class MechanismChain:
         ])  # fmt: skip
         self._by_drive = np.zeros((3 * len(drives), len(drives)))
         self._by_drive[kept] = np.linalg.solve(compliance[np.ix_(kept, kept)], motions[kept])
+        # The face of a soft actuator moves by less than its input: push - spring * motion is the mechanism's force.
+        soft = np.array([drive.is_soft for drive in drives])
+        spring = np.diag([drive.spring_n_mm if drive.is_soft else 1.0 for drive in drives])
+        push = np.diag([drive.push_n if drive.is_soft else 1.0 for drive in drives])
+        yielding = np.where(soft[:, None], motions.T @ self._by_drive, 0.0)
+        self._faces = np.linalg.solve(yielding + spring, push)
+        self._by_drive = self._by_drive @ self._faces
         self._motions = motions
         self._load = self._by_drive @ per_input_of(mechanism)
 
@@ -267,8 +278,18 @@ class MechanismChain:
         stress = max(self._stress_mpa(place, load) for place in {place for path in self._paths for place in path})
         pairs = pair_distances_mm(mechanism, probes, large=False)
         forces = self._motions.T @ load
-        return MechanismState(input_mm, float(per_input @ forces), probes, pairs, stress, load, {}, self._poses(load),
-                              named_forces_n(mechanism, forces))  # fmt: skip
+        return MechanismState(
+            input_mm,
+            float(per_input @ forces),
+            probes,
+            pairs,
+            stress,
+            load,
+            {},
+            self._poses(load),
+            named_by_drive(mechanism, forces),
+            faces_mm=named_by_drive(mechanism, self._faces @ (per_input * input_mm)),
+        )
 
     def _moved(self, point: Array, own: list[int], load: Array) -> Array:
         """Motion (x, y, rotation) of a point beyond the flexures `own`, under the loads at all drives."""

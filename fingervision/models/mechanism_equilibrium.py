@@ -2,7 +2,7 @@
 
 from bisect import insort
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +10,7 @@ import scipy.linalg
 import scipy.optimize
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse import csr_matrix, hstack, vstack
+from scipy.sparse import csr_matrix, diags, hstack, vstack
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from fingervision.domain.errors import ModelError
@@ -58,6 +58,8 @@ _RESIDUAL = 1e-8
 _ON = 1e-6
 """Tolerance of contact as a share of the input: largest gap of a touching node, and largest penetration before a node
 is held."""
+_EXTRAPOLATED, _LEAST_APART = 3, 1e-3
+"""Number of equilibria from which the next one is extrapolated, and their least distance as a share of the input."""
 _TOUCHES = 1e-7
 """Gap, as a share of the input, at which a node counts as just touching."""
 _SLOW = 0.1
@@ -110,6 +112,42 @@ class _Reached:
     pressed: Array
 
 
+def _spread(path: list[_Reached], size_mm: float) -> list[_Reached]:
+    """Last states of a path, at most three, that lie far enough apart to be extrapolated without their rounding errors.
+
+    Two tables of inputs may have the same input but for its last digits.
+    """
+    kept = [path[-1]]
+    for state in path[-2::-1]:
+        if len(kept) < _EXTRAPOLATED and kept[0].size_mm - state.size_mm > _LEAST_APART * size_mm:
+            kept.insert(0, state)
+    return kept
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Actuators:
+    """The actuators of a mechanism's drives, those that yield or prescribe a force (soft ones) and rigid stages.
+
+    A soft actuator pushes its face with the force `push_n` times its input, less `spring_n_mm` times the face's motion.
+
+    Parameters
+    ----------
+    rows : ndarray of float, shape (unknowns, drives)
+        Weights of the unknowns in the motion of every soft drive's face; zero for a stage.
+    spring_n_mm, push_n : ndarray of float, shape (drives,)
+        Stiffness, and force per unit of input, of every actuator; zero for a stage.
+    """
+
+    rows: Array
+    spring_n_mm: Array
+    push_n: Array
+
+    def forces_n(self, settings: Array, moved: Array) -> Array:
+        """Force of every soft actuator (row) at given inputs of the drives and displacements; zero for a stage."""
+        by_face = self.spring_n_mm * (self.rows.T @ moved).T
+        return np.asarray((self.push_n * settings.T - by_face).T)
+
+
 @dataclass(frozen=True, eq=False)
 class DrivenMechanism:
     """A driven elastic mechanism.
@@ -134,6 +172,8 @@ class DrivenMechanism:
     gaps : tuple of callable
         For every contact pair, a function that maps displacements to the gaps of its nodes (infinite for a node that
         faces nothing) and their derivatives.
+    actuators : Actuators or None
+        Actuators of the drives; None where every drive is a stage.
     """
 
     name: str
@@ -144,6 +184,54 @@ class DrivenMechanism:
     per_input: Array
     mass: Callable[[], csr_matrix]
     gaps: Pairs = ()
+    actuators: Actuators | None = None
+
+    def actuated(self, actuators: Actuators, soft: Flags) -> "DrivenMechanism":
+        """Return the system with some drives moved by soft actuators, so that their faces are free to move.
+
+        The springs of the actuators become part of the stiffness, and their pushes are loads.
+        """
+        rows = csr_matrix(actuators.rows)
+        springs = csr_matrix(rows @ diags(actuators.spring_n_mm) @ rows.T)
+
+        def tangent(moved: Array) -> tuple[csr_matrix, Array]:
+            stiffness, force = self.tangent(moved)
+            return csr_matrix(stiffness + springs), force + springs @ moved
+
+        return replace(
+            self,
+            tangent=tangent,
+            internal=lambda moved: self.internal(moved) + springs @ moved,
+            motions=csr_matrix(hstack([self.motions, csr_matrix(self.by_drive[:, soft])])),
+            by_drive=np.where(soft, 0.0, self.by_drive),
+            actuators=actuators,
+        )
+
+    @cached_property
+    def load_by_drive(self) -> Array:
+        """Loads of soft actuators per unit of every drive's input, shape (unknowns, drives)."""
+        zero = np.zeros(self.by_drive.shape)
+        return zero if self.actuators is None else self.actuators.rows * self.actuators.push_n
+
+    @cached_property
+    def body_stiffness_n_mm(self) -> csr_matrix:
+        """Stiffness matrix for small motions without the springs of actuators."""
+        if self.actuators is None:
+            return self.stiffness_n_mm
+        rows = csr_matrix(self.actuators.rows)
+        return csr_matrix(self.stiffness_n_mm - rows @ diags(self.actuators.spring_n_mm) @ rows.T)
+
+    def drive_forces_n(self, settings: Array, moved: Array, loads_n: Array) -> Array:
+        """Force at every drive, from the inputs, displacements, and internal forces less all loads on the body."""
+        forces = np.asarray(self.by_drive.T @ loads_n)
+        return forces if self.actuators is None else forces + self.actuators.forces_n(settings, moved)
+
+    def face_motions(self, moved: Array, input_mm: float) -> Array:
+        """Motion of every driven face along its direction, shape (drives,)."""
+        settings = self.per_input * input_mm
+        if self.actuators is None:
+            return settings
+        return np.where(self.actuators.rows.any(axis=0), self.actuators.rows.T @ moved, settings)
 
     @property
     def unknowns(self) -> int:
@@ -179,7 +267,7 @@ class DrivenMechanism:
             If the supports allow the mechanism to move freely, or the drives move it without deforming it.
         """
         moved = self.unit_by_drive @ self.per_input
-        if self.per_input.size > 1:
+        if self.per_input.size > 1 and self.actuators is None:
             each = np.diag(self.drive_stiffness_n_mm) @ self.per_input**2
             if moved @ (self.stiffness_n_mm @ moved) <= _STRAINLESS * each:
                 raise ModelError(
@@ -198,7 +286,7 @@ class DrivenMechanism:
             If the supports allow the mechanism to move freely.
         """
         try:
-            load = self.motions.T @ (self.stiffness_n_mm @ self.by_drive)
+            load = self.motions.T @ (self.stiffness_n_mm @ self.by_drive - self.load_by_drive)
             moved = self.by_drive - self.motions @ self._solver.solve(np.ascontiguousarray(load))
         except RuntimeError:  # exactly singular
             moved = np.full(self.by_drive.shape, np.inf)
@@ -209,11 +297,15 @@ class DrivenMechanism:
     @cached_property
     def drive_stiffness_n_mm(self) -> Array:
         """Force at every driven face (row) per 1 mm of every driven face (column), at rest (N/mm)."""
-        return np.asarray(self.unit_by_drive.T @ (self.stiffness_n_mm @ self.unit_by_drive))
+        unit = self.unit_by_drive
+        forces = np.asarray(unit.T @ (self.stiffness_n_mm @ unit - self.load_by_drive))
+        return forces if self.actuators is None else forces + self.actuators.forces_n(np.eye(self.per_input.size), unit)
 
     @cached_property
     def input_stiffness_n_mm(self) -> float:
         """Force at the drive per 1 mm of input, at rest (N/mm)."""
+        if self.actuators is not None:
+            return float(self.per_input @ self.drive_stiffness_n_mm @ self.per_input)
         moved = self.unit_displacement
         return float(moved @ (self.stiffness_n_mm @ moved))
 
@@ -231,6 +323,8 @@ class DrivenMechanism:
     def modes(self, *, drive_held: bool, count: int) -> tuple[Array, Array, Array]:
         """First natural modes, with the drive fixed or free to move along its direction.
 
+        With a soft actuator, fixed means that the actuator holds its input, and free that it is taken away.
+
         Returns
         -------
         rad_s : ndarray of float, shape (count,)
@@ -238,12 +332,13 @@ class DrivenMechanism:
         shapes : ndarray of float, shape (unknowns, count)
             Mode shapes of unit modal mass.
         drive : ndarray of float, shape (count,)
-            Motion of the input in each mode; zero with the drive held.
+            Motion of the input in each mode, for a soft actuator of its face; zero with the drive held.
         """
-        columns = self.motions
-        if not drive_held:
+        columns, by_stage = self.motions, not drive_held and bool(self.by_input.any())
+        if by_stage:
             columns = hstack([columns, csr_matrix(self.by_input[:, None])], format="csr")
-        K, M = ((columns.T @ matrix @ columns).tocsc() for matrix in (self.stiffness_n_mm, self.mass_t))
+        stiffness = self.stiffness_n_mm if drive_held else self.body_stiffness_n_mm
+        K, M = ((columns.T @ matrix @ columns).tocsc() for matrix in (stiffness, self.mass_t))
         size = K.shape[0]
         if size < _DENSE_BELOW:
             # Solve the reciprocal eigenvalue problem: masses may be zero, whereas the stiffness is positive definite.
@@ -254,8 +349,11 @@ class DrivenMechanism:
             by_load = LinearOperator(K.shape, solver.solve, dtype=np.float64)
             squared, sought = eigsh(K, count, M, sigma=0.0, OPinv=by_load, v0=np.ones(size))
         order = np.argsort(squared)
+        shapes = np.asarray(columns @ sought[:, order])
         drive = np.zeros(count) if drive_held else sought[-1, order]
-        return np.sqrt(squared[order]), np.asarray(columns @ sought[:, order]), drive
+        if not drive_held and not by_stage and self.actuators is not None:
+            drive = self.per_input @ (self.actuators.rows.T @ shapes) / (self.per_input @ self.per_input)
+        return np.sqrt(squared[order]), shapes, drive
 
     def touch_inputs_mm(self) -> list[float | None]:
         """Input nearest to zero (mm) at which each contact pair touches, for small displacements; None if never."""
@@ -307,7 +405,8 @@ class DrivenMechanism:
             compliance = (slope @ by_force)[np.ix_(facing, facing)]
             forces[facing] = contact_forces_n(0.5 * (compliance + compliance.T) + between[1], apart[facing])
             moved = moved + by_force @ forces
-        drives = self.by_drive.T @ (self.stiffness_n_mm @ moved - slope.T @ forces)
+        settings = self.per_input * input_mm
+        drives = self.drive_forces_n(settings, moved, self.stiffness_n_mm @ moved - slope.T @ forces)
         return MechanismEquilibrium(moved, float(self.per_input @ drives), drives, self._by_pair(forces))
 
     @cached_property
@@ -342,7 +441,7 @@ class DrivenMechanism:
         while (last := path[-1]).size_mm < abs(input_mm):
             to = min(abs(input_mm), last.size_mm + step_mm)
             at = float(np.copysign(to, input_mm))
-            found = self._settled(self._predicted(path[-3:], at), last.touching, last.pressed, at, pairs)
+            found = self._settled(self._predicted(_spread(path, to), at), last.touching, last.pressed, at, pairs)
             if found is not None:
                 path.append(_Reached(to, *found))
                 insort(known, path[-1], key=lambda state: state.size_mm)
@@ -357,7 +456,7 @@ class DrivenMechanism:
                 )
         moved, pressed = path[-1].moved, path[-1].pressed
         loads = self.internal(moved) - self._all_gaps(pairs, moved)[1].T @ pressed
-        drives = np.asarray(self.by_drive.T @ loads)
+        drives = self.drive_forces_n(self.per_input * input_mm, moved, loads)
         by_pair = self._by_pair(pressed) if pairs else ()
         return MechanismEquilibrium(moved, float(self.per_input @ drives), drives, by_pair)
 
@@ -425,11 +524,12 @@ class DrivenMechanism:
         motions = self.motions
         scale = float(np.abs(self.stiffness_n_mm @ self.unit_displacement).max()) * abs(input_mm)
         solver, before = None, np.inf
+        pushed = self.load_by_drive @ (self.per_input * input_mm)
         for _ in range(_NEWTON_STEPS):
             gap, slopes, bend = self._all_gaps(pairs, moved)
             held = touching & np.isfinite(gap)
             slope, gap = slopes[held], gap[held]
-            loads = motions.T @ (self.internal(moved) - slope.T @ pressed[held])
+            loads = motions.T @ (self.internal(moved) - slope.T @ pressed[held] - pushed)
             residual = float(np.abs(loads).max())
             if residual <= _RESIDUAL * scale and np.all(np.abs(gap) <= _ON * abs(input_mm)):
                 return moved, pressed

@@ -9,6 +9,7 @@ from scipy.sparse import csr_matrix, diags
 
 from fingervision.domain.errors import DataError
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism
+from fingervision.models.mechanism_equilibrium import Actuators, DrivenMechanism
 from fingervision.models.plane_stress import PlaneStressPlate
 
 Array = NDArray[np.float64]
@@ -17,18 +18,25 @@ Indices = NDArray[np.int64]
 _ON = 1e-7
 """Distance from a face's box within which a node counts as lying on the face, as a share of the body's size."""
 
+_PIN_POINTS = 61
+"""Points in a pin's circle; with four times as many, the stiffness of a lever changes by less than 1e-3."""
+_OUTSIDE = -1e-9
+"""Least value of the shape functions of a quadratic triangle's edges inside it (0, with rounding): they are four times
+the product of two barycentric coordinates."""
 _LEVER = 1e-6
 """Lever arms across a component that are shorter than this share of the face's extent do not prevent rotation."""
 
 
 def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm: float) -> Indices:
-    """Nodes of the outline inside a face's box.
+    """Nodes of the outline inside a face's box; for a pin, the nodes that its mean motion depends on.
 
     Raises
     ------
     DataError
         If no part of the outline lies in the box.
     """
+    if face.is_pin:
+        return _within_pin(plate, face)[0]
     x, y = plate.nodes_mm
     x0, x1, y0, y1 = face.box_mm
     near = _ON * size_mm
@@ -41,6 +49,29 @@ def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm:
             f"[{x0:g}, {x1:g}, {y0:g}, {y1:g}] mm holds none."
         )
     return np.asarray(nodes)
+
+
+def _within_pin(plate: PlaneStressPlate, face: Face) -> tuple[Indices, Array]:
+    """Nodes and their weights in the mean motion of the body within a pin's circle.
+
+    The points of the mean fill the circle evenly (a spiral with the golden angle); those outside the body are left out.
+    """
+    x0, x1, _, _ = face.box_mm
+    place = np.arange(_PIN_POINTS)
+    radius, angle = 0.5 * (x1 - x0) * np.sqrt((place + 0.5) / _PIN_POINTS), place * np.pi * (3.0 - np.sqrt(5.0))
+    points = np.array(face.middle_mm)[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
+    found = [plate.weights_at((float(x), float(y))) for x, y in points.T]
+    inside = [(nodes, weights) for nodes, weights in found if weights[3:].min() > _OUTSIDE] or found[:1]
+    total = np.zeros(plate.x_dofs.size)
+    for nodes, weights in inside:
+        total[nodes] += weights / len(inside)
+    kept = np.flatnonzero(total)
+    return kept, total[kept]
+
+
+def drive_weights(plate: PlaneStressPlate, nodes: Indices, face: Face) -> Array:
+    """Weights of a driven face's nodes in its mean motion, shape (k,), with sum 1."""
+    return _within_pin(plate, face)[1] if face.is_pin else mean_weights(plate, nodes)
 
 
 def mean_weights(plate: PlaneStressPlate, nodes: Indices) -> Array:
@@ -74,6 +105,27 @@ def driven_components(drive: Drive) -> tuple[str, ...]:
     if drive.across == "held":
         return "x", "y"
     return ("x",) if drive.direction[0] != 0.0 else ("y",)
+
+
+def with_actuators(system: DrivenMechanism, rows: Array, mechanism: Mechanism) -> DrivenMechanism:
+    """Add the soft actuators of a drawing, if any, to the equations of its driven faces.
+
+    Parameters
+    ----------
+    system : DrivenMechanism
+        The mechanism with the motions of its driven faces prescribed.
+    rows : ndarray of float, shape (unknowns, drives)
+        Weights of the unknowns in the motion of every driven face along its direction.
+    mechanism : Mechanism
+        The drawing.
+    """
+    drives = mechanism.drives
+    soft = np.array([drive.is_soft for drive in drives])
+    if not soft.any():
+        return system
+    spring = np.array([drive.spring_n_mm for drive in drives])
+    push = np.array([drive.push_n for drive in drives])
+    return system.actuated(Actuators(np.where(soft, rows, 0.0), spring, push), soft)
 
 
 def per_input_of(mechanism: Mechanism) -> Array:

@@ -20,6 +20,8 @@ from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, out_of_plane
 
 Array = NDArray[np.float64]
 
+_MODE_ERROR = 0.005
+"""Relative error of a natural frequency beside that of the stiffness, of which it is the square root."""
 _STILL = 1e-3
 """Smallest change of a pair's distance, as a share of the input, for a pair that can grip a part."""
 
@@ -72,9 +74,9 @@ def per_kelvin(model: MechanismPlate) -> tuple[Array, float] | None:
         return None
     free = np.zeros(plate.unknowns)
     free[plate.x_dofs], free[plate.y_dofs] = expansion * plate.nodes_mm
-    stiffness = system.stiffness_n_mm
-    grown = system.under_load(stiffness @ free)
-    return grown, float(system.by_input @ (stiffness @ (grown - free)))
+    grown = system.under_load(system.body_stiffness_n_mm @ free)
+    loads = system.body_stiffness_n_mm @ (grown - free)
+    return grown, float(system.per_input @ system.drive_forces_n(np.zeros(system.per_input.size), grown, loads))
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,17 @@ class GrippedPair:
         input.
         """
         grip = abs(self.per_input) / self.compliance_mm_n
-        return grip / (self.model.stiffness_n_mm + grip * abs(self.per_input))
+        return grip / (self.model.stiffness_n_mm + grip * abs(self._force_per_grip))
+
+    @property
+    def _force_per_grip(self) -> float:
+        """Change of the drive's force per 1 N of grip; by Betti's theorem, -`per_input` for a stage."""
+        system, row = self.model.driven, self.model.pair_rows[self.pair]
+        if system.actuators is None:
+            return -self.per_input
+        still = np.zeros(system.per_input.size)
+        loads = system.stiffness_n_mm @ self._pushed - row
+        return float(system.per_input @ system.drive_forces_n(still, self._pushed, loads))
 
     def touch_input_mm(self, part: Part) -> float:
         """Input at which the fingers first touch the part (mm).
@@ -153,17 +165,15 @@ class GrippedPair:
         pressed_mm = max(part.width_mm - free_mm, 0.0)
         grip = pressed_mm / (self.compliance_mm_n + 1.0 / part.stiffness_n_mm)
         moved = input_mm * model.unit_displacement_mm + grip * self._pushed
-        force = model.stiffness_n_mm * input_mm - grip * self.per_input
+        force = model.stiffness_n_mm * input_mm + grip * self._force_per_grip
         return PairGrip(input_mm, free_mm + grip * self.compliance_mm_n, grip, force, model.peak_stress(moved).mpa)
 
 
 MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
 
 
-def mechanism_figures(model: MechanismModel) -> dict[str, float]:
+def response_figures(model: MechanismModel) -> dict[str, float]:
     """Compute response per 1 mm of input, input range up to yield, inputs of first contact, natural frequencies.
-
-    Finite elements also give the effects of weight, temperature and a gripped part, and the motions out of the plane.
 
     Parameters
     ----------
@@ -190,6 +200,10 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     for name, value in unit.pairs_mm.items():
         figures[f"{name}: at rest [mm]"] = rest.pairs_mm[name]
         figures[f"{name}: per input [mm/mm]"] = value - rest.pairs_mm[name]
+    for drive in model.mechanism.drives:
+        if drive.is_soft:
+            name = drive.face.name
+            figures[f"{name}: motion per input [mm/mm]"] = unit.faces_mm[name]
     if len(model.mechanism.drives) > 1:
         figures |= _of_drives(model)
     for name, value in model.touch_input_mm().items():
@@ -197,8 +211,29 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     for held, label in ((False, "drive_free"), (True, "drive_held")):
         for place, value in enumerate(model.modes_hz(drive_held=held), 1):
             figures[f"mode_{place}_{label}_hz"] = value
+    return figures
+
+
+def mechanism_figures(model: MechanismModel) -> dict[str, float]:
+    """Compute the figures of `response_figures`, and the errors of the model.
+
+    Finite elements also give the effects of weight, temperature and a gripped part, and the motions out of the plane.
+
+    Parameters
+    ----------
+    model : MechanismPlate, MechanismFrame or MechanismChain
+        Model of the drawing.
+
+    Returns
+    -------
+    dict of str to float
+        Numbers by name, with the unit at the end of the name.
+    """
+    figures = response_figures(model)
     errors = {"model_error_force_percent": 100.0 * model.force_error}
-    if isfinite(unit.stress_mpa):
+    if "mode_1_drive_free_hz" in figures:
+        errors["model_error_modes_percent"] = 100.0 * (0.5 * model.force_error + _MODE_ERROR)
+    if "peak_stress_mpa_per_mm" in figures:
         errors["model_error_stress_percent"] = 100.0 * model.stress_error
     if isinstance(model, MechanismPlate):
         figures |= operating_figures_of(model)

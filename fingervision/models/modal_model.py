@@ -66,6 +66,11 @@ class ModalModel:
         modes, normalised to unit modal mass.
     observed : mapping of str to Observable
         Computed outputs by the name of their column.
+    face_per_input : float
+        Static motion of the driven face per 1 mm of input: 1 for a stage, less for a soft actuator.
+    force_share : float
+        Share of the vibration's inertia that acts on the drive: 1 for a stage and for an actuator with a stiffness, 0
+        for one that prescribes the force.
     """
 
     stiffness_n_mm: float
@@ -73,6 +78,8 @@ class ModalModel:
     rad_s: Array
     participation: Array
     observed: Mapping[str, Observable]
+    face_per_input: float = 1.0
+    force_share: float = 1.0
 
     @property
     def modes_hz(self) -> Array:
@@ -191,7 +198,7 @@ def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None
         coordinate[rows], acceleration[rows] = _run(model, ratios, drive.time_s[rows], inputs[rows])
     static = {name: seen.rest_mm + seen.per_input * inputs for name, seen in model.observed.items()}
     observed = {name: static[name] + coordinate @ seen.by_mode for name, seen in model.observed.items()}
-    inertia = acceleration @ model.participation
+    inertia = model.force_share * (acceleration @ model.participation)
     return Motion(drive, observed, static, model.stiffness_n_mm * inputs + inertia, inertia, ratios, model.modes_hz)
 
 
@@ -311,7 +318,7 @@ def frequency_response(
         frequency_hz=w[:, 0] / (2.0 * pi),
         per_input=per_input,
         per_force_mm_n={n: receptance(s.per_input / k, free.by_mode[n][kept]) for n, s in model.observed.items()},
-        drive_per_force_mm_n=receptance(1.0 / k, drive),
+        drive_per_force_mm_n=receptance(model.face_per_input / k, drive),
         modes_hz=model.modes_hz,
         free_modes_hz=rad_s / (2.0 * pi),
         damping_ratios=ratios,

@@ -13,6 +13,7 @@ from fingervision.domain.errors import FingervisionError, ModelError, UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_mechanism import check_outline, redrawn
+from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper, MechanismFrame
 from fingervision.models.mechanism import Mechanism
@@ -209,16 +210,16 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
     rows = []
     corrected = theory is HingeTheory.CORRECTED
     blocks = block_compliances(partial(varied, gripper, variations), [v.values for v in variations])
-    by = ratios(_figures(LumpedGripper(gripper, theory=theory)),
-                _figures(LumpedGripper(gripper, theory=theory, bars_alone=True)))  # fmt: skip
+    by = ratios(sweep_figures(LumpedGripper(gripper, theory=theory)),
+                sweep_figures(LumpedGripper(gripper, theory=theory, bars_alone=True)))  # fmt: skip
     for values in grid:
         drawn = varied(gripper, variations, values)
         block = blocks(values) if corrected else None
-        rows.append(scaled(_figures(LumpedGripper(drawn, theory=theory, block=block, bars_alone=True)), by))
+        rows.append(scaled(sweep_figures(LumpedGripper(drawn, theory=theory, block=block, bars_alone=True)), by))
     return np.array(grid), np.array([list(row.values()) for row in rows], dtype=float)
 
 
-def _figures(model: LumpedGripper) -> dict[str, float]:
+def sweep_figures(model: DrawnGripper) -> dict[str, float]:
     """Results for one drawing, by the names in `COLUMNS`."""
     stress, touch = model.peak_stress().mpa_per_mm, model.first_touch_mm
     at_yield = model.gripper.material.yield_mpa / stress

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import brentq
 
+from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import PointMm
 from fingervision.models.corotational_frame import CorotationalFrame
 from fingervision.models.lumped import MechanismFrame
@@ -244,6 +245,12 @@ class PlaceAnswers:
             dofs = body.unknowns
             arm = arms[np.ix_(dofs, dofs)]
             stiffness[np.ix_(dofs, dofs)] += arm.T @ body.stiffness_n_mm @ arm
+        if model.driven.actuators is not None:
+            raise ModelError(
+                f"A changed hinge or link of {self.mechanism.name} can be predicted where every drive is a stage, but "
+                "one has a stiffness or a force of its own; leave out its stiffness_n_mm and force_n_per_input, and "
+                "give the motion of the driven face as the input."
+            )
         free, unit = model.free, model.by_input
         factor = cho_factor(stiffness[np.ix_(free, free)])
         loads, energies = self._slips(changed)

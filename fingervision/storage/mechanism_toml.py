@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot
 from pathlib import Path
 from types import MappingProxyType
@@ -13,6 +13,7 @@ from fingervision.domain.parameter import Estimate
 from fingervision.models.flexure import Flexure
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box, crosses_itself
+from fingervision.models.strips import strips_of
 from fingervision.storage.drawing_numbers import bare_tables, changed_tables, numbers_of
 from fingervision.storage.drawing_reader import DrawingReader, as_table, number
 from fingervision.storage.gripper_template import mechanism_from_gripper
@@ -36,6 +37,9 @@ _TOP = (
     "contact",
 )
 _SHAPES = {"bar_mm": 4, "box_mm": 4, "disc_mm": 3, "ellipse_mm": 5}
+_DRIVE = (
+    "name", "box_mm", "pin_mm", "direction", "across", "turns", "per_input", "stiffness_n_mm", "force_n_per_input",
+)  # fmt: skip
 _FLEXURES = {
     "circular": ("thickness_mm", "radius_mm"),
     "elliptic": ("thickness_mm", "half_length_mm", "depth_mm"),
@@ -84,18 +88,29 @@ class MechanismDrawing:
             return mechanism_from_gripper(tables, self.path)
         return mechanism_from_tables(tables, str(self.path))
 
+    def value(self, name: str) -> float:
+        """Value of one number of the drawing, by its dotted name.
+
+        Raises
+        ------
+        DataError
+            The name does not denote a number of the drawing.
+        """
+        changed_tables(self.tables, {name: 0.0}, str(self.path))
+        raw = numbers_of(self.tables)[name]
+        return number(raw, self._lengths, f"{name} in {self.path}") if isinstance(raw, str) else raw
+
     @property
-    def estimates(self) -> dict[str, Estimate]:
-        """Return the dimensions with a stated uncertainty: their values and standard uncertainties."""
+    def _lengths(self) -> dict[str, float]:
         lengths: dict[str, float] = {}
         for name, raw in as_table(self.tables.get("lengths", {}), f"[lengths] in {self.path}").items():
             lengths[name] = number(raw, lengths, f"lengths.{name} in {self.path}")
-        values = numbers_of(self.tables)
-        found = {}
-        for name, u in self.uncertainties.items():
-            raw = values[name]
-            found[name] = Estimate(number(raw, lengths, f"{name} in {self.path}") if isinstance(raw, str) else raw, u)
-        return found
+        return lengths
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Return the dimensions with a stated uncertainty: their values and standard uncertainties."""
+        return {name: Estimate(self.value(name), u) for name, u in self.uncertainties.items()}
 
 
 def read_drawing(path: Path) -> MechanismDrawing:
@@ -154,6 +169,8 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
     )
     pairs = {name: ends for t in reader.sections(tables, "pair", least=0) for name, ends in [reader.pair(t, mechanism)]}
     mechanism.pairs.update(pairs)
+    with_strips = (*mechanism.flexures, *strips_of(mechanism.region, mechanism.flexures))
+    mechanism = replace(mechanism, flexures=with_strips)
     _refuse_same_names(tables, reader)
     check_material(material, origin)
     check_mechanism(mechanism, mechanism.region)
@@ -287,7 +304,7 @@ class _Reader(DrawingReader):
         return found
 
     def drive(self, table: Mapping[str, Any], what: str) -> Drive:
-        self.known(table, ("name", "box_mm", "direction", "across", "turns", "per_input"), what)
+        self.known(table, _DRIVE, what)
         x, y = self.numbers(table, "direction", 2, what)
         across = table.get("across", "held")
         if hypot(x, y) == 0.0:
@@ -297,14 +314,32 @@ class _Reader(DrawingReader):
                 f"{what}.across in {self.origin} must be 'held', or 'free' if {what}.direction is along x or "
                 f"y, but is {across!r}."
             )
-        turns = table.get("turns", across)
+        turns = table.get("turns", "free" if "pin_mm" in table else across)
         if turns not in ("held", "free"):
             raise DataError(
                 f"{what}.turns in {self.origin} must be 'free' (a rod or a pin: the face may turn) or 'held' (a clamp "
                 f"or a flat plate), but is {turns!r}."
             )
         per_input = self.value({"per_input": 1.0, **table}, "per_input", what)
-        return Drive(self.face(table, what), (x / hypot(x, y), y / hypot(x, y)), across, per_input, turns)
+        own = [self.positive(table, key, what) if key in table else None
+               for key in ("stiffness_n_mm", "force_n_per_input")]  # fmt: skip
+        return Drive(
+            self.driven(table, what, turns), (x / hypot(x, y), y / hypot(x, y)), across, per_input, turns, *own
+        )
+
+    def driven(self, table: Mapping[str, Any], what: str, turns: str) -> Face:
+        """Read the face or the pin of a drive."""
+        if "pin_mm" not in table:
+            return self.face(table, what)
+        if "box_mm" in table:
+            raise DataError(f"{what} in {self.origin} must have either box_mm (a face) or pin_mm, but has both.")
+        x, y, diameter = self.numbers(table, "pin_mm", 3, what)
+        if diameter <= 0.0:
+            raise DataError(f"{what}.pin_mm in {self.origin} must be [x, y, diameter > 0], but is {table['pin_mm']!r}.")
+        if turns == "held":
+            raise DataError(f'{what}.turns in {self.origin} must be "free", as a pin does not hold a rotation.')
+        half = 0.5 * diameter
+        return Face(str(table.get("name", what)), (x - half, x + half, y - half, y + half), is_pin=True)
 
     def probe(self, table: Mapping[str, Any]) -> tuple[str, tuple[float, float]]:
         name = str(table.get("name", ""))

@@ -8,7 +8,7 @@ import skfem
 from scipy.sparse.linalg import spsolve
 from skfem.helpers import ddot, eye, sym_grad, trace
 
-from fingervision.domain.errors import DataError
+from fingervision.domain.errors import DataError, ModelError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
@@ -124,3 +124,81 @@ def test_the_ends_of_a_face_do_not_make_the_frame_jump(tmp_path: Path) -> None:
 def test_what_a_drive_cannot_do_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"turns .* must be 'free' .* but is 'often'"):
         lever(tmp_path, "40, 50, 10, 10", 'turns = "often"')
+
+
+SOFT_N_MM = 0.5
+ROD = 'across = "free"'
+KINDS = (MechanismPlate, MechanismFrame, MechanismChain)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_actuator_with_a_stiffness_is_a_spring_in_series(tmp_path: Path, kind: type) -> None:
+    stage = kind(lever(tmp_path, "40, 50, 10, 10", ROD))
+    soft = kind(lever(tmp_path, "40, 50, 10, 10", f"{ROD}\nstiffness_n_mm = {SOFT_N_MM}")).state(2.0)
+    own = stage.stiffness_n_mm
+    moved = 2.0 * SOFT_N_MM / (SOFT_N_MM + own)
+    assert soft.force_n == pytest.approx(own * moved, rel=1e-6)
+    assert soft.faces_mm["drive"] == pytest.approx(moved, rel=1e-6)
+    pushed = kind(lever(tmp_path, "40, 50, 10, 10", f"{ROD}\nforce_n_per_input = 0.3")).state(2.0)
+    assert pushed.force_n == pytest.approx(0.6)
+    assert pushed.faces_mm["drive"] == pytest.approx(0.6 / own, rel=1e-6)
+    assert pushed.stress_mpa == pytest.approx(stage.state(0.6 / own).stress_mpa, rel=1e-6)
+
+
+def test_a_force_and_a_motion_give_the_same_deformed_shape(tmp_path: Path) -> None:
+    """The equilibrium with the force of a stage at 4 mm has its face at 4 mm, by both kinds in large rotation."""
+    for kind in (MechanismPlate, MechanismFrame):
+        stage = kind(lever(tmp_path, "40, 50, 10, 10", ROD)).state(4.0, large_rotation=True)
+        force = kind(lever(tmp_path, "40, 50, 10, 10", f"{ROD}\nforce_n_per_input = 1.0"))
+        pushed = force.state(stage.force_n, large_rotation=True)
+        assert pushed.faces_mm["drive"] == pytest.approx(4.0, rel=1e-6)
+        assert pushed.drives_n["drive"] == pytest.approx(stage.force_n)
+
+
+def test_modes_with_an_actuator_lie_between_a_free_and_a_held_drive(tmp_path: Path) -> None:
+    """For a stiffness that is soft beside the body's own modes, the square of the first frequency rises by k."""
+    box = "40, 50, 10, 10"
+    free = MechanismFrame(lever(tmp_path, box, f"{ROD}\nforce_n_per_input = 1.0"))
+    by_rod, own = free.modes_hz(drive_held=True, count=1)[0], 1.0 / free.state(1.0).faces_mm["drive"]
+    weak = 0.02 * own
+    spring = MechanismFrame(lever(tmp_path, box, f"{ROD}\nstiffness_n_mm = {weak}")).modes_hz(drive_held=True, count=1)
+    assert by_rod == pytest.approx(free.modes_hz(drive_held=False, count=1)[0])
+    assert (spring[0] / by_rod) ** 2 - 1.0 == pytest.approx(weak / own, rel=0.05)
+    stiff = MechanismFrame(lever(tmp_path, box, f"{ROD}\nstiffness_n_mm = 1e5")).modes_hz(drive_held=True, count=1)[0]
+    held = MechanismFrame(lever(tmp_path, box, ROD)).modes_hz(drive_held=True, count=1)[0]
+    assert stiff == pytest.approx(held, rel=0.02)
+
+
+def test_inputs_that_differ_in_their_last_digits_do_not_spoil_the_next_one(tmp_path: Path) -> None:
+    """Equilibria are extrapolated from the last ones; two at the same input would multiply their rounding errors."""
+    fresh = MechanismFrame(lever(tmp_path, "40, 50, 10, 10", ROD))
+    spoilt = MechanismFrame(lever(tmp_path, "40, 50, 10, 10", ROD))
+    for value in (2.0, 4.0, np.nextafter(4.0, 5.0)):
+        spoilt.state(float(value), large_rotation=True)
+    expected = fresh.state(4.1, large_rotation=True)
+    assert spoilt.state(4.1, large_rotation=True).force_n == pytest.approx(expected.force_n, rel=1e-7)
+
+
+def pinned(folder: Path, how: str) -> Mechanism:
+    path = folder / "mechanism.toml"
+    path.write_text(LEVER.replace("box_mm = [{box}]\n", "").format(how=how))
+    return read_mechanism(path)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_pin_turns_the_lever_as_a_rod_at_its_arm_does(tmp_path: Path, kind: type) -> None:
+    """On the leaf's axis, a pin that cannot slide does not hold the lever either."""
+    rod = kind(lever(tmp_path, "40, 50, 10, 10", ROD)).stiffness_n_mm
+    for across in ("free", "held"):
+        drawn = pinned(tmp_path, f'pin_mm = [45, 5, 2]\nacross = "{across}"')
+        assert kind(drawn).stiffness_n_mm == pytest.approx(rod, rel=0.003)
+        assert "1 mm radius" in drawn.drives[0].words
+
+
+def test_a_pin_must_lie_on_a_body(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"pin drive .* must lie on the body, but \(45, 30\)"):
+        pinned(tmp_path, "pin_mm = [45, 30, 2]")
+    with pytest.raises(DataError, match="must have either box_mm"):
+        lever(tmp_path, "40, 50, 10, 10", "pin_mm = [45, 5, 2]")
+    with pytest.raises(ModelError, match="lies on flexure leaf"):
+        MechanismFrame(pinned(tmp_path, 'pin_mm = [15, 5, 0.4]\nacross = "free"'))
