@@ -80,6 +80,9 @@ class MeasuredTable(ShortRepr):
     u_clock_s : float
         Standard uncertainty (s) of the offset between the clocks of the input and the gap, if this offset was estimated
         from the motion in this table; 0 if both have the same clock, or if no uncertainty is stated.
+    stamp_s : float
+        Resolution (s) of the times at which the input was read from a log; 0 if input and gap were read together, or
+        if the times are not rounded.
     channels : mapping of str to Channel
         User-named columns, such as `right_finger.angle_mrad`.
     """
@@ -96,6 +99,7 @@ class MeasuredTable(ShortRepr):
     slots: tuple[ReferenceSlot, ...] = ()
     path: RecordedPath | None = None
     u_clock_s: float = 0.0
+    stamp_s: float = 0.0
     channels: Mapping[str, Channel] = field(default_factory=lambda: MappingProxyType({}))
 
     @property

@@ -242,6 +242,10 @@ NO_COUNT = (
 )
 
 
+OVERLAP = "the next picture begins within its bytes"
+"""Bytes belong to one picture: a block that reaches into the next one stands where a damaged file has moved it."""
+
+
 def pictures(container: av.container.InputContainer, stream: av.VideoStream, path: Path) -> Iterator[Picture]:
     """Decode an open file.
 
@@ -362,6 +366,8 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
         if is_timeless and packet is not None:
             packet.pts = packet.dts = None
         if before is not None:
+            if not hole and packet is not None and "matroska" in container.format.name:
+                hole = OVERLAP if _overlaps(before.packet, packet) else ""
             if hole or end:
                 is_last = (packet is None or not packet.size) and not end
                 before = replace(before, hole="" if is_last else hole, end=end, at_end=hole if is_last else "")
@@ -371,6 +377,12 @@ def _read(container: av.container.InputContainer, stream: av.VideoStream, path: 
         if is_timeless and before is None:
             loses_time = NO_SCALE
         before = _Read(packet, missing, loses_time, places is not None)
+
+
+def _overlaps(before: "av.Packet[av.VideoStream]", packet: "av.Packet[av.VideoStream]") -> bool:
+    """Whether a packet begins within the bytes of the one before; packets of one block have one position."""
+    first, second = before.pos, packet.pos
+    return first is not None and second is not None and first < second < first + before.size
 
 
 def _before(read: _Read, trail: DamageTrail) -> Iterator[Picture]:

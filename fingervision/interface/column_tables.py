@@ -66,7 +66,7 @@ def measured_from_columns(table: Any) -> MeasuredTable:
     runs = ["" if _is_missing(run) else str(run) for run in columns["run"]] if "run" in columns else None
     table_in_memory = measured_table.measured_rows(Path("measured"), values, runs)
     # A columns.toml in the current folder does not apply to columns in memory.
-    return replace(table_in_memory, slots=(), u_clock_s=0.0)
+    return replace(table_in_memory, slots=(), u_clock_s=0.0, stamp_s=0.0)
 
 
 def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:

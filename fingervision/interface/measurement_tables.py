@@ -12,6 +12,7 @@ from fingervision.domain.status import Status
 from fingervision.interface.column_tables import measured_from_columns
 from fingervision.measuring.in_memory import MeasuredInMemory
 from fingervision.motion.clock.clock_offset import ClockOffset
+from fingervision.motion.time_stamps import frame_resolution_s
 from fingervision.storage.beside import response_note
 from fingervision.storage.gaps_csv import COLUMNS, GapRow
 from fingervision.storage.measured_table import NUMBERS
@@ -61,7 +62,8 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
     table = measured_from_columns(columns)
     shifts_px = [row.u_shift_px for row in found.rows if row.u_shift_px is not None]
     table = replace(table, notes=(*table.notes, *response_note(found.summary, shifts_px)))
-    return replace(table, u_clock_s=clock.u_time_s) if isinstance(clock, ClockOffset) else table
+    stamp_s = 0.0 if table.time_s is None else frame_resolution_s(table.time_s)
+    return replace(table, u_clock_s=clock.u_time_s if isinstance(clock, ClockOffset) else 0.0, stamp_s=stamp_s)
 
 
 def dataframe(found: MeasuredInMemory) -> "pd.DataFrame":

@@ -1,11 +1,12 @@
 """Refuse the measurement of a frame that the frames before and after it contradict.
 
 A finger is a body: between two frames it moves, rotates and bends a little, at any speed, but it keeps its width and
-its outline. Wrong content in a picture (a page of memory that was not written again, a lost packet that no checksum
-covers, an object that passes) has other outlines, or tears the picture between two rows. A jump of the measuring points
-alone proves nothing, because stages make steps and springs vibrate; nor does another outline alone, because parts come
-and go. A measurement is refused if its measuring points jump, the fingers there have not the outlines that they have in
-the last frame, and the next frames do not confirm the change.
+its outline. Both fingers are held by one frame, so that along their own direction neither moves without the other by
+more than it moves across. Wrong content in a picture (a page of memory that was not written again, a lost packet that
+no checksum covers, an object that passes) has other outlines, or tears the picture between two rows. A jump of the
+measuring points alone proves nothing, because stages make steps and springs vibrate; nor does another outline alone,
+because parts come and go. A measurement is refused if its measuring points jump, the fingers there have not the
+outlines that they have in the last frame, and the next frames do not confirm the change.
 
 Method: the outlines of a finger are followed from the measuring point towards its root, on the inner and on the outer
 side, as the places where the grey level passes through that of the measured edge. Relative to the measuring point, and
@@ -185,6 +186,10 @@ def _is_alike(first: _Seen, second: _Seen) -> bool:
         tolerance_px = JUMP_U * hypot(one.u_across_px, other.u_across_px) + CODED_PX + bent_px
         if not _agree(first.looks[k], second.looks[k], tolerance_px):
             return False
+    along_px = [second.positions[k][0] - first.positions[k][0] for k in (2, 3)]
+    u_along_px = hypot(*(seen.positions[k][1] for seen in (first, second) for k in (2, 3)))
+    if abs(along_px[1] - along_px[0]) > JUMP_U * u_along_px + MOST_BENT_PX + max(moved_px[:2]):
+        return False
     return abs(first.torn_share - second.torn_share) <= TORN_SHARE
 
 

@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.motion.encoder import input_sigma
+from fingervision.motion.encoder import differences, input_sigma
+from fingervision.motion.path_between_rows import CORNER, FEWEST
 
 # Intervals of a log in which the stage jumps between two rest positions, so that its position is unknown.
 
@@ -58,6 +61,37 @@ def within_jump(drive: DriveHistory, time_s: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(inside & jumps(drive)[np.clip(after - 1, 0, drive.time_s.size - 2)])
 
 
+KNOWN = 2.0
+"""Distance between curve and chord in the middle of an interval, in standard uncertainties of the curve there, above
+which the rows know the curve. For a sine it is 0.9 / (phase between two rows)^2: 36 for 5 Hz at 200 rows a second.
+Beside a corner, or between two corners, it is at most 1.
+"""
+
+
+@lru_cache(maxsize=4)
+def _curves(drive: DriveHistory) -> tuple[NDArray[np.intp], tuple[Akima1DInterpolator, ...]]:
+    """Akima's curve through the rows of each run, and the number of the curve of each interval; -1 means the chord.
+
+    A chord lies inside every bend of the motion by up to an eighth of the rows' second difference: by 0.6 um for a
+    stroke of 0.4 mm at 5 Hz and 200 rows a second, which looks like a lever's error or an end stop.
+    """
+    chosen, curves = np.full(max(drive.time_s.size - 1, 0), -1, dtype=np.intp), list[Akima1DInterpolator]()
+    names = np.zeros(drive.time_s.size) if drive.run is None else np.array(drive.run)
+    borders = [0, *(1 + np.flatnonzero(names[1:] != names[:-1])).tolist(), drive.time_s.size]
+    for begin, end in pairwise(borders):
+        if end - begin < FEWEST:
+            continue
+        time_s, input_mm = drive.time_s[begin:end], drive.input_mm[begin:end]
+        curve = Akima1DInterpolator(time_s, input_mm)
+        chord_mm = 0.5 * (input_mm[1:] + input_mm[:-1])
+        bend_mm = np.abs(curve(0.5 * (time_s[1:] + time_s[:-1])) - chord_mm)
+        fourth = np.abs(np.pad(differences(input_mm, time_s, 4), 2, mode="edge"))
+        is_known = bend_mm > KNOWN * CORNER * (fourth[1:] + fourth[:-1])
+        chosen[begin : end - 1][is_known] = len(curves)
+        curves.append(curve)
+    return chosen, tuple(curves)
+
+
 @dataclass(frozen=True, slots=True)
 class DriveState:
     """Recorded input, run and force at one instant.
@@ -78,8 +112,9 @@ class DriveState:
 
 
 def drive_at(drive: DriveHistory, time_s: float) -> DriveState | None:
-    """Interpolate the drive linearly between the two samples that bracket an instant.
+    """Interpolate the drive between the two samples that bracket an instant.
 
+    The input follows a curve through the rows where these know the curve, and is linear elsewhere; the force is linear.
     Nothing is extrapolated: before the first sample, after the last sample, and between two runs the function returns
     no input. The function returns no input within a jump of the log between two rest positions either, because the
     position during the jump is unknown.
@@ -115,4 +150,9 @@ def drive_at(drive: DriveHistory, time_s: float) -> DriveState | None:
     force_n = None
     if drive.force_n is not None:
         force_n = float((1.0 - share) * drive.force_n[before] + share * drive.force_n[after])
-    return DriveState(run[0], float((1.0 - share) * drive.input_mm[before] + share * drive.input_mm[after]), force_n)
+    input_mm = float((1.0 - share) * drive.input_mm[before] + share * drive.input_mm[after])
+    if before != after:
+        chosen, curves = _curves(drive)
+        if chosen[before] >= 0:
+            input_mm = float(curves[chosen[before]](time_s))
+    return DriveState(run[0], input_mm, force_n)

@@ -1,6 +1,6 @@
 """The recorded input of a table: command or motion, smoothed, with the effect of its remaining error on the gap."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +10,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import Model
 from fingervision.motion.input_path import mostly_at_rest, recorded
 from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
+from fingervision.motion.time_stamps import input_error_of_stamps
 
 # Distinguish step commands from encoder readings: both stay constant and jump while the stage moves slowly.
 
@@ -106,6 +107,8 @@ class RecordedInput:
         Whether the fluctuations of the record are also visible in the gap, and were therefore not smoothed.
     commanded : bool
         Whether the record is a command that keeps its value until it jumps.
+    stamps_mm : ndarray of float, shape (n,), or None
+        Effect on the gap of the rounding of the frames' times, independent from row to row; None if there is none.
     """
 
     smooth_mm: Array
@@ -117,6 +120,7 @@ class RecordedInput:
     samples: float
     is_motion: bool = False
     commanded: bool = False
+    stamps_mm: Array | None = None
 
     @classmethod
     def exact(cls, table: MeasuredTable, *, is_motion: bool = False, commanded: bool = False) -> "RecordedInput":
@@ -141,29 +145,30 @@ class RecordedInput:
         along_mm, time_s, runs = recorded(table)
         if time_s is None or mostly_at_rest(table):
             return cls.exact(table)
-        rows = np.arange(along_mm.size) if table.path is None else table.path.rows
         gap_of_input = model.respond(table.input_mm).gap_mm
         if is_commanded(table.input_mm, table.runs, gap_of_input, table.gap_mm):
             return cls.exact(table, commanded=True)
         record = SmoothedRecord.of(along_mm, time_s, runs)
+        rows = np.arange(along_mm.size) if table.path is None else table.path.rows
+        is_motion = record.sigma_mm > 0.0 and _is_motion(table, model, record.blended_mm[rows])
+        exact = record.sigma_mm == 0.0 or is_motion
+        smooth = along_mm if exact else record.blended_mm
+        low, high = range_mm
+        reach = 1e-3 * (high - low)
+        ahead, behind = (model.respond(smooth[rows] + way).gap_mm for way in (reach, -reach))
+        slope = np.abs(ahead - behind) / (2.0 * reach)
+        stamps_mm = slope * input_error_of_stamps(smooth, time_s, runs, table.stamp_s)[rows] if table.stamp_s else None
+        if exact:
+            return replace(cls.exact(table, is_motion=is_motion), stamps_mm=stamps_mm)
         snapped_mm, leverage, sigma, step = record.recorded_mm, record.leverage, record.sigma_mm, record.step_mm
-        if sigma == 0.0:
-            return cls.exact(table)
-        smooth = record.blended_mm
-        if _is_motion(table, model, smooth[rows]):
-            return cls.exact(table, is_motion=True)
         samples, stays = 1.0 / float(np.median(leverage)), leverage < STAYING
         if step > 0.0:
             samples = max(samples, HELD_SAMPLES)
             stays = _within(snapped_mm, runs, HELD_SAMPLES, 1.01 * step) | _within(
                 snapped_mm, runs, SLOW_SAMPLES, 2.01 * step
             )
-        low, high = range_mm
-        reach = 1e-3 * (high - low)
-        ahead, behind = (model.respond(smooth[rows] + way).gap_mm for way in (reach, -reach))
-        slope = np.abs(ahead - behind) / (2.0 * reach)
         error = slope * sigma * np.sqrt(leverage[rows])
-        return cls(smooth[rows], smooth, sigma, step, error, stays[rows], samples)
+        return cls(smooth[rows], smooth, sigma, step, error, stays[rows], samples, stamps_mm=stamps_mm)
 
 
 def standing_still(history: History, least_rows: int) -> tuple[slice, ...]:

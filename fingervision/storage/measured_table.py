@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError
 from fingervision.domain.field import declared
 from fingervision.domain.measured_table import Channel, MeasuredTable, RecordedPath
-from fingervision.storage.beside import response_note_beside, slots_beside, u_clock_beside
+from fingervision.motion.time_stamps import frame_resolution_s
+from fingervision.storage.beside import measurement_beside, response_note_beside, slots_beside, u_clock_beside
 from fingervision.storage.csv_columns import read_columns
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.number_columns import Numbers
@@ -178,6 +179,7 @@ def measured_rows(
         slots=slots_beside(path),
         path=along,
         u_clock_s=u_clock_beside(path),
+        stamp_s=frame_resolution_s(time) if time is not None and measurement_beside(path) else 0.0,
         channels=channels_of(channels, kept[order]),
     )
 

@@ -1,13 +1,14 @@
 """Speed, memory and start-up of `measure`.
 
     python tests/benchmarks/speed.py [--frames 1500] [--runs 5] [--only rate|kinds|memory|start] [--sizes 1920x1080]
+        [--coders ffv1.mkv] [--lengths 60 2000]
 
 Rate: frames per second of decoding alone and of measuring, in turn on the same file, medians; and milliseconds of one
-core for everything after decoding, beside the same steps written plainly with OpenCV and with scikit-image. Kinds: the
-same milliseconds for a picture of 3840x2160 and for each kind of picture without two fingers, which is refused. Memory:
-peak of `measure` at 60 and 2000 frames, for four codecs and three sizes of the picture (`--sizes` takes fewer).
-Start-up: `fingervision --help`. Every figure is that of the machine it runs on; the clip of the rates is 640x480, H.264
-of about 5 Mbit/s.
+core for everything after decoding, beside the same steps written plainly with OpenCV and with scikit-image. Kinds:
+the same milliseconds for a picture of 3840x2160 and for each kind of picture without two fingers, which is refused.
+Memory: peak of `measure` at 60 and 2000 frames (`--lengths`), for four codecs (`--coders`) and three sizes of the
+picture (`--sizes`). Start-up: `fingervision --help`. Every figure is that of the machine it runs on; the clip of the
+rates is 640x480, H.264 of about 5 Mbit/s.
 """
 
 import argparse
@@ -48,6 +49,7 @@ NOISE_GREY, CRF = 4.0, 20.0
 RENDERED = 100
 # Pictures of the clip that is repeated for the lengths (frames) at which memory is read.
 RENDERED_FOR_MEMORY, LENGTHS, RATE_HZ = 20, (60, 2000), 25
+CODERS = ("h264.mp4", "hevc.mp4", "mjpeg.mkv", "ffv1.mkv")
 SIZES = ("640x480", "1920x1080", "3840x2160")
 
 
@@ -196,10 +198,10 @@ def repeat(clip: Path, path: Path, times: int) -> None:
                 target.mux(packet)
 
 
-def memory(folder: Path, sizes: list[str]) -> None:
+def memory(folder: Path, sizes: list[str], coders: list[str], lengths: list[int]) -> None:
     """Largest resident memory of `measure` at two lengths, and what the longer file needs of the shorter's."""
     rng = np.random.default_rng(4)
-    short, long = LENGTHS
+    short, long = lengths
     print(f"\n{f'Peak memory of measure, {short} and {long} frames':46}{'MB':>7}{'MB':>7}{'ratio':>7}")
     for size in sizes:
         width_px, height_px = (int(part) for part in size.split("x"))
@@ -207,11 +209,11 @@ def memory(folder: Path, sizes: list[str]) -> None:
         scene = [two_fingers((90.0 + k) * zoom, radius_px=34.0, frame=(width_px, height_px)) for k in range(5)]
         shown = [render(each, Camera(blur_px=0.9, noise_grey=NOISE_GREY), rng) for each in scene]
         clip = [Frame(shown[k % len(shown)], k, k / RATE_HZ) for k in range(RENDERED_FOR_MEMORY)]
-        for kind in ("h264.mp4", "hevc.mp4", "mjpeg.mkv", "ffv1.mkv"):
+        for kind in coders:
             drawn = folder / kind
             coded(drawn, clip, *KINDS[kind])
             peaks = []
-            for count in LENGTHS:
+            for count in lengths:
                 path = folder / f"{count}-{kind}"
                 repeat(drawn, path, count // RENDERED_FOR_MEMORY)
                 if (frames := decode(path)) != count:
@@ -235,6 +237,8 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--only", choices=["rate", "kinds", "memory", "start"])
     parser.add_argument("--sizes", nargs="+", default=SIZES)
+    parser.add_argument("--coders", nargs="+", default=CODERS, choices=CODERS)
+    parser.add_argument("--lengths", nargs=2, type=int, default=LENGTHS)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder, levels = Path(name), pictures() if asked.only in (None, "rate") else []
@@ -245,7 +249,7 @@ def main() -> None:
         if asked.only in (None, "start"):
             start_up(asked.runs)
         if asked.only in (None, "memory"):
-            memory(folder, asked.sizes)
+            memory(folder, asked.sizes, asked.coders, asked.lengths)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 """Recordings with variable rate and jitter, in which nothing is hidden: neither damage nor an effect may be seen.
 
-Run as `python -m tests.benchmarks.uneven_times [--recordings 100] [--minutes 30] [--seed 1] [--verbose]` from the top.
-The frames of a moving gripper are rendered at uneven instants (a phone with +-4 ms of jitter, a camera that halves its
-rate in the dark, one that leaves frames out, one whose rate wanders, and 120 Hz with stamps of a millisecond), coded as
-H.264 in MP4, FFV1 or Motion JPEG in Matroska, measured with a log of the stage on another clock, and diagnosed with the
-model from which the frames were drawn. Printed for each kind: recordings, frames, frames called damaged (must be 0),
-clocks that are not determined, and verdicts; `agrees` or `unknown` must be 95 %.
+Run as `python -m tests.benchmarks.uneven_times [--recordings 100] [--minutes 30] [--seed 1] [--first 0] [--only phone]
+[--verbose]` from the top. The frames of a moving gripper are rendered at uneven instants (a phone with +-4 ms of
+jitter, a camera that halves its rate in the dark, one that leaves frames out, one whose rate wanders, and 120 Hz with
+stamps of a millisecond), coded as H.264 in MP4, FFV1 or Motion JPEG in Matroska, measured with a log of the stage on
+another clock, and diagnosed with the model from which the frames were drawn. Printed for each kind: recordings, frames,
+frames called damaged (must be 0), clocks that are not determined, and verdicts; `agrees` or `unknown` must be 95 %.
 """
 
 import argparse
@@ -121,6 +121,10 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--recordings", type=int, default=100)
+    parser.add_argument(
+        "--first", type=int, default=0, help="number of the first recording, to go on where a run ended"
+    )
+    parser.add_argument("--only", choices=KINDS)
     parser.add_argument("--minutes", type=float, default=float("inf"))
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--verbose", action="store_true")
@@ -128,10 +132,12 @@ def main() -> None:
     until = time.monotonic() + 60.0 * chosen.minutes
     totals: dict[str, Counter[str]] = defaultdict(Counter)
     with tempfile.TemporaryDirectory() as folder:
-        for number in range(chosen.recordings):
+        for number in range(chosen.first, chosen.recordings):
             if time.monotonic() > until:
                 break
             kind = KINDS[number % len(KINDS)]
+            if chosen.only not in (None, kind):
+                continue
             try:
                 frames, damaged, verdict, words = examined(
                     Path(folder), kind, np.random.default_rng([chosen.seed, number])

@@ -122,3 +122,16 @@ def test_fingers_that_the_border_cuts_in_one_frame_are_not_confirmed_by_the_othe
             levels[:, :160] = np.roll(levels[:, :160], -20, axis=1)
 
     assert refused(MOTIONS["rest"], change) == [6]
+
+
+def test_one_finger_alone_does_not_move_along_itself() -> None:
+    # A page of raw video that stands elsewhere leaves straight sides where they are, and moves only the tips.
+    def change(k: int, levels: np.ndarray) -> None:
+        if k == 6:
+            levels[:, :160] = np.roll(levels[:, :160], -6, axis=0)
+            levels[-6:] = levels[-7]
+        if k == 9:  # a push at the camera moves both
+            levels[:] = np.roll(levels, -6, axis=0)
+            levels[-6:] = levels[-7]
+
+    assert refused(MOTIONS["slow"], change) == [6]

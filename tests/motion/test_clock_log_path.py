@@ -5,7 +5,7 @@ import pytest
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.motion.clock.corner_rounding import rounded
-from fingervision.motion.clock.noise import _even_variance
+from fingervision.motion.clock.noise import even_variance
 from fingervision.motion.encoder import input_sigma, on_lines
 from fingervision.motion.log_path import LogPath
 from tests.benchmarks import drawn_recordings
@@ -67,7 +67,7 @@ def test_the_frames_own_variance_is_found_beside_uncertain_and_wrong_ones(wrong,
     input_mm2 = np.where(rng.random(2000) < uncertain, 9.0, 0.0)
     residual = rng.normal(size=2000) * np.sqrt(1.0 + input_mm2)
     residual[rng.random(2000) < wrong] += 40.0
-    assert _even_variance(residual**2, input_mm2) == pytest.approx(1.0, rel=0.25)
+    assert even_variance(residual**2, input_mm2) == pytest.approx(1.0, rel=0.25)
 
 
 def test_a_rounded_turn_between_two_rows_is_drawn_finely_enough_for_the_play():

@@ -68,3 +68,34 @@ def test_turns_between_the_rows_of_a_log_are_counted_with_their_distance() -> No
     assert missed_mm == pytest.approx(0.042, abs=0.002)
     corners = DriveHistory(np.arange(0.0, 20.0, 0.1), 2.0 * np.abs((np.arange(0.0, 20.0, 0.1) / 4.0) % 1.0 * 2.0 - 1.0))
     assert unseen_turns(corners) == (0, 0.0)
+
+
+def test_a_motion_that_bends_between_the_rows_is_followed_by_a_curve() -> None:
+    def motion(time_s: np.ndarray) -> np.ndarray:
+        return np.asarray(0.2 * np.sin(2.0 * np.pi * 5.0 * time_s))
+
+    rng, noise_mm = np.random.default_rng(4), 5e-5
+    rows_s = np.arange(0.0, 2.0, 5e-3)
+    log = DriveHistory(rows_s, motion(rows_s) + rng.normal(0.0, noise_mm, rows_s.size))
+    frames_s = rng.uniform(0.1, 1.9, 300)
+    found = np.array([drive_at(log, at).input_mm for at in frames_s])  # type: ignore[union-attr]
+    # The rows' noise, and chords where the noise hides the bend; all chords are inside the bends by up to 6e-4 mm.
+    assert float(np.std(found - motion(frames_s))) < 1.5 * noise_mm
+    assert float(np.max(np.abs(np.interp(frames_s, rows_s, motion(rows_s)) - motion(frames_s)))) > 10.0 * noise_mm
+
+
+@pytest.mark.parametrize(
+    "input_mm",
+    [
+        np.interp(np.arange(40.0), [0.0, 3.0, 8.0, 9.0, 20.0, 39.0], [0.0, 0.0, 1.0, 1.0, -0.3, 0.8]),
+        np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0]),
+        np.round(np.arange(40.0) * 0.013 / 0.05) * 0.05,
+    ],
+    ids=["strokes", "only corners", "encoder"],
+)
+def test_strokes_corners_and_steps_of_an_encoder_stay_linear(input_mm: np.ndarray) -> None:
+    log = DriveHistory(np.arange(float(input_mm.size)), input_mm)
+    for at in np.arange(0.3, input_mm.size - 1.0, 0.7):
+        state = drive_at(log, float(at))
+        if state is not None:
+            assert state.input_mm == pytest.approx(float(np.interp(at, log.time_s, input_mm)), abs=1e-12)

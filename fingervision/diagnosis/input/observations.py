@@ -25,6 +25,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import FunctionModel
+from fingervision.motion.clock.noise import even_variance
 from fingervision.motion.input_path import NO_TURNS, UnseenTurns, input_path, turning_readings
 from fingervision.motion.recorded_input import RecordedInput
 
@@ -37,6 +38,9 @@ FORM_SHARE_OF_RIGS = 0.25
 """Share of an explained part that its formula may leave as residual if repeats determine the noise: the reversal of
 real stages differs by 19 to 24 % from place to place (ISO 230-2 tables, among them those of `real/rigs`), and readings
 at rest repeat well enough to show this."""
+SEEN_STAMPS = 0.3
+"""Largest effect of the rounding of a frame's time on the gap, relative to the noise, below which it is left to the
+noise: it then changes a variance by less than a tenth."""
 SHORT = 100
 """Number of samples below which no row is excluded before an effect is found."""
 NOTHING: Mapping[str, Mapping[str, float]] = MappingProxyType({})
@@ -158,6 +162,7 @@ class Observations:
         parts = np.split(residual_mm, len(self.channels))
         aside = self.outliers(parts, explained=explained)
         repeated = self.measured_pure_errors(aside)
+        parts[0] = self.without_stamps(parts[0])
         noises = (
             channel_noises(self.chain.history, parts, aside, self.floors_mm, degrees, explained=explained)
             if repeated is None
@@ -190,15 +195,19 @@ class Observations:
             error > 0.3 * noises[0].total_mm
         ):
             error = np.zeros_like(error)
+        held = np.where(self.recorded.stays, error, 0.0)
         passing = np.where(self.recorded.stays, 0.0, error)
         noises = (without_input(noises[0], passing), *noises[1:])
+        stamps = self.recorded.stamps_mm
+        if stamps is not None and np.any(stamps > SEEN_STAMPS * noises[0].total_mm):
+            passing = np.hypot(passing, stamps)
         beside = [columns for _, columns in self.random_effects_mm(values)]
         drawing = np.hstack(beside) if beside else None
         whitener = Whitener(
             history,
             noises,
             np.concatenate(aside),
-            error - passing,
+            held,
             self.recorded.samples,
             passing,
             drawing,
@@ -213,6 +222,18 @@ class Observations:
         return Problem(
             self.chain, whitener.one(self.aim_mm), whitener, offsets, self.effects, share, self.stalled, mapped
         )
+
+    def without_stamps(self, residual_mm: Array) -> Array:
+        """Reduce a residual of the gap to the variance that it would have without rounded times; shape (n,).
+
+        The effect of rounded times grows with the speed, and is zero in holds of the stage: it is no part of the noise
+        of the picture, and is accounted for separately.
+        """
+        stamps_mm = self.recorded.stamps_mm
+        if stamps_mm is None:
+            return residual_mm
+        variance = even_variance((residual_mm - np.median(residual_mm)) ** 2, stamps_mm**2)
+        return np.asarray(residual_mm / np.sqrt(1.0 + stamps_mm**2 / variance))
 
     def measured_pure_errors(self, aside: list[Flags]) -> list[PureError] | None:
         """Repeatability of each channel from readings at rest; None if there are too few repeats."""

@@ -7,6 +7,7 @@ from fingervision.domain.effect import Array
 from fingervision.effects.play_operator import play
 from fingervision.motion.clock.joint_fit import Fit
 from fingervision.motion.clock.motion_model import Motion, Noise
+from fingervision.motion.time_stamps import frame_resolution_s, input_error_of_stamps
 
 MOST_ORDER = 4
 """Largest order; four terms approximate an autoregression plus white noise sufficiently."""
@@ -76,7 +77,7 @@ def noise_of(motion: Motion, found: Fit) -> Noise:
     own_mm, shared_mm, stretch = of_input(motion, found)
     input_mm2 = own_mm**2
     residual_mm, taken = _without_shared(found.residual_mm - np.median(found.residual_mm), stretch, shared_mm)
-    even_mm2 = max(_even_variance(residual_mm**2, input_mm2) * taken, _least_variance(residual_mm))
+    even_mm2 = max(even_variance(residual_mm**2, input_mm2) * taken, _least_variance(residual_mm))
     shrunk = residual_mm * np.sqrt(even_mm2 / (even_mm2 + input_mm2))
     terms = autoregression(np.clip(shrunk, -4.0 * np.sqrt(even_mm2), 4.0 * np.sqrt(even_mm2)))
     order = terms.size
@@ -107,8 +108,8 @@ def of_input(motion: Motion, found: Fit) -> tuple[Array, Array, NDArray[np.intp]
     Returns
     -------
     own_mm, shared_mm : ndarray of float, shape (n,)
-        Standard uncertainty of the predicted gap due to the path between rows, and due to the common error of a
-        stretch.
+        Standard uncertainty of the predicted gap due to the path between rows and the rounding of the frame's time,
+        and due to the common error of a stretch.
     stretch : ndarray of int, shape (n,)
         Stretch of the log to which each frame belongs.
     """
@@ -116,7 +117,11 @@ def of_input(motion: Motion, found: Fit) -> tuple[Array, Array, NDArray[np.intp]
     after = np.clip(np.searchsorted(motion.drive.time_s, log_s), 0, motion.path.u_mm.size - 1)
     slope = abs(found.scale) / max(0.5 * float(np.ptp(motion.drive.input_mm)), 1e-12)
     stretch = _stretch_of(motion, found, log_s)
-    return slope * motion.path.u_mm[after], slope * motion.path.shared.u_mm[stretch], stretch
+    inputs_mm = np.interp(log_s, motion.drive.time_s, motion.drive.input_mm)
+    rounded_mm = input_error_of_stamps(
+        inputs_mm, motion.time_s, (slice(0, log_s.size),), frame_resolution_s(motion.time_s)
+    )
+    return slope * np.hypot(motion.path.u_mm[after], rounded_mm), slope * motion.path.shared.u_mm[stretch], stretch
 
 
 SEEN_SHARED = 0.5
@@ -165,8 +170,15 @@ def _without_shared(residual_mm: Array, stretch: NDArray[np.intp], shared_mm: Ar
     return out, out.size / max(out.size - means, 1)
 
 
-def _even_variance(squares: Array, input_mm2: Array) -> float:
+def even_variance(squares: Array, input_mm2: Array) -> float:
     """Maximum-likelihood variance that must be added to `input_mm2`, if a share of the frames may be outliers.
+
+    Parameters
+    ----------
+    squares : ndarray of float, shape (n,)
+        Squared residuals (mm^2).
+    input_mm2 : ndarray of float, shape (n,)
+        Variance of each residual that is known (mm^2).
 
     Frames with a well-known input determine the variance; a median over all frames would fail if these frames are a
     minority. The residuals are assumed to have a contaminated normal distribution (Tukey 1960). If large squares were
