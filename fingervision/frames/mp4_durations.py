@@ -16,7 +16,7 @@ Source: ISO/IEC 14496-12, 8.4.2 (`mdhd`), 8.6 (`stts`, `ctts`, `elst`), 8.7.3 (`
 
 import mmap
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import accumulate, chain, repeat
@@ -60,7 +60,7 @@ def numbers(content: mmap.mmap, begin: int, end: int) -> tuple[int, int]:
     return scale, ticks
 
 
-def rows(content: mmap.mmap, place: tuple[int, int], form: str) -> Iterator[tuple[int, int]]:
+def rows(content: mmap.mmap, place: tuple[int, int], form: str) -> list[tuple[int, int]]:
     """Rows of a table that begins with the number of its rows.
 
     Raises
@@ -70,30 +70,10 @@ def rows(content: mmap.mmap, place: tuple[int, int], form: str) -> Iterator[tupl
     """
     begin, end = place
     (count,) = struct.unpack_from(">4xI", content[begin:end])
-    size = struct.calcsize(form)
-    if begin + 8 + count * size > end:
+    last = begin + 8 + count * struct.calcsize(form)
+    if last > end:
         raise struct.error("fewer rows than announced")
-    for k in range(count):
-        one, other = struct.unpack_from(form, content, begin + 8 + k * size)
-        yield one, other
-
-
-def edits(content: mmap.mmap, place: tuple[int, int]) -> Iterator[tuple[int, int]]:
-    """Durations in an edit list, with the ticks at which they begin; -1 means that nothing is shown.
-
-    Raises
-    ------
-    struct.error
-        There are fewer than announced.
-    """
-    is_long = content[place[0]] == 1
-    form, size = (">Qq", 20) if is_long else (">Ii", 12)
-    (count,) = struct.unpack_from(">4xI", content[slice(*place)])
-    if place[0] + 8 + count * size > place[1]:
-        raise struct.error("fewer rows than announced")
-    for k in range(count):
-        duration, at = struct.unpack_from(form, content, place[0] + 8 + k * size)
-        yield duration, at
+    return list(struct.iter_unpack(form, content[begin + 8 : last]))
 
 
 GIVES_UP = "error reading header"
@@ -121,7 +101,7 @@ class _Track:
     ----------
     scale, ticks : int
         Ticks per second of the track, and its duration in ticks.
-    steps : tuple of (int, int)
+    steps : sequence of (int, int)
         Numbers of pictures with their durations in ticks.
     sizes, offset_count : int or None
         Number of pictures with a size, and with an offset of presentation.
@@ -137,7 +117,7 @@ class _Track:
 
     scale: int
     ticks: int
-    steps: tuple[tuple[int, int], ...]
+    steps: Sequence[tuple[int, int]]
     sizes: int | None
     offset_count: int | None
     presented: int
@@ -263,9 +243,12 @@ def _track(content: mmap.mmap, inner: dict[bytes, tuple[int, int]]) -> _Track | 
     if not {b"mdhd", b"stts"} <= inner.keys():
         return None
     scale, ticks = numbers(content, *inner[b"mdhd"])
-    steps = tuple(rows(content, inner[b"stts"], ">II"))
-    offsets = tuple(rows(content, inner[b"ctts"], ">Ii")) if b"ctts" in inner else None
-    shown_parts = list(edits(content, inner[b"elst"])) if b"elst" in inner else []
+    steps = rows(content, inner[b"stts"], ">II")
+    offsets = rows(content, inner[b"ctts"], ">Ii") if b"ctts" in inner else None
+    shown_parts: list[tuple[int, int]] = []  # durations with the ticks at which they begin; -1: nothing is shown
+    if b"elst" in inner:
+        is_long = content[inner[b"elst"][0]] == 1
+        shown_parts = rows(content, inner[b"elst"], ">Qq4x" if is_long else ">Ii4x")
     if b"edts" in inner and b"elst" not in inner:
         raise struct.error("a box edts without its list elst")
     sizes = None
@@ -286,7 +269,7 @@ def _track(content: mmap.mmap, inner: dict[bytes, tuple[int, int]]) -> _Track | 
     return _Track(scale, ticks, steps, sizes, counted, last - first, shown, empty, skipped)
 
 
-def _presented(steps: tuple[tuple[int, int], ...], offsets: tuple[tuple[int, int], ...]) -> tuple[int, int]:
+def _presented(steps: Sequence[tuple[int, int]], offsets: Sequence[tuple[int, int]]) -> tuple[int, int]:
     """First tick at which a picture is presented, and the end of the last picture (ticks)."""
     if sum(count for count, _ in steps) > MOST_PICTURES:
         return 0, sum(count * ticks for count, ticks in steps)
