@@ -1,6 +1,7 @@
 """The motor record that caproto's project simulates, in a process of its own on the loopback."""
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -51,3 +52,18 @@ class MotorRecordServer:
             self._process.stdout.close()
 
     close = unplug
+
+
+class HangingServer(MotorRecordServer):
+    """A server that may stop answering while its connection stays open."""
+
+    _silent = False
+
+    @property
+    def silent(self) -> bool:
+        return self._silent
+
+    @silent.setter
+    def silent(self, silent: bool) -> None:
+        self._silent = silent
+        self._process.send_signal(signal.SIGSTOP if silent else signal.SIGCONT)

@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from tests.testbed.stages import emulators
-from tests.testbed.stages.motor_record import MotorRecordServer
+from tests.testbed.stages.motor_record import HangingServer, MotorRecordServer
 
 LIMITS = "lower_mm = -2\nupper_mm = 8\nspeed_mm_s = 5\naccuracy_mm = 0.002\n"
 CAMERA = f"""
@@ -113,7 +113,7 @@ CASES: dict[str, Case] = {
         virtual=False,
     ),
     # The simulated record moves in ticks of 50 ms, each a little late.
-    "epics_motor": Case(MotorRecordServer, 'kind = "epics_motor"\nrecord = "PORT"\n', "caproto", 0.8, virtual=False),
+    "epics_motor": Case(HangingServer, 'kind = "epics_motor"\nrecord = "PORT"\n', "caproto", 0.8, virtual=False),
     "ophyd_epics": Case(
         MotorRecordServer,
         'kind = "ophyd"\ndevice = "ophyd:EpicsMotor"\narguments = ["PORT"]\nnamed = { name = "stage" }\n',

@@ -179,12 +179,14 @@ def test_nonsense_and_silence_are_sentences_and_leave_the_stage_at_rest(
         bed.actuator.readings()
     bed.close()  # the stop needs no answer
     wait(bed, 0.05)
-    assert not device.plant.moves
-    assert device.plant.at() < 1.0
+    if hasattr(device, "plant"):
+        assert not device.plant.moves
+        assert device.plant.at() < 1.0
     with pytest.raises(FingervisionError, match=r"must .* but "):
         open_bed(str(case.bed_at(tmp_path, device)))
     setattr(device, fault, False)
     again = open_bed(str(case.bed_at(tmp_path, device)))
+    assert again.actuator.readings()[-1].value < 1.0
     assert manual_control.home(again) == pytest.approx(0.0, abs=0.002)
     again.close()
 

@@ -2,13 +2,18 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from fingervision.domain.errors import DataError, DeviceError
+from fingervision.domain.status import Status
 from fingervision.storage.recipe_toml import read_recipe
-from fingervision.storage.samples_csv import read_samples
+from fingervision.storage.samples_csv import read_samples, row_with, write_rows
+from fingervision.tables.read import read_measured_table
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.run.recipe_run import run_recipe
@@ -107,6 +112,23 @@ def test_channels_become_columns_and_a_slow_one_does_not_slow_the_frames(
     bed.close()
     slow.close()
     fast.close()
+
+
+def test_the_diagnosis_reads_the_same_from_a_table_with_channels(tmp_path: Path) -> None:
+    names = ("temperature_degc", "load_n", "input_v", "force", "direction")
+    seen = []
+    for channels in ((), names):
+        rows = [
+            row_with(channels)(
+                "1", 0.04 * k, at_mm, 0.5 + 0.3 * at_mm, -0.2 * at_mm, 0.5 + 0.1 * at_mm, 0.001, 0.0005, 0.3,
+                Status.OK, k, 1, at_mm, 0.04 * k, 0.04 * k + 0.01, **dict.fromkeys(channels, 7.0 + k),
+            )
+            for k, at_mm in enumerate(np.sin(np.linspace(0.0, 6.0, 60)).tolist())
+        ]  # fmt: skip
+        write_rows(tmp_path / "samples.csv", rows)
+        seen.append(read_measured_table(tmp_path / "samples.csv"))
+    for of in fields(seen[0]):
+        assert_array_equal(*(getattr(table, of.name) for table in seen))
 
 
 @pytest.mark.parametrize("name", ["gap_mm", "two words", "", "1st"])
