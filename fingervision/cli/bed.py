@@ -313,8 +313,7 @@ def steps(steps_toml: Path, figure: Path | None, run_them: bool, bed_name: str) 
     test bed's configuration.
     """
     from fingervision.storage.steps_toml import read_steps
-    from fingervision.testbed.manual.step_running import run_sequence, step_limits
-    from fingervision.testbed.manual.steps_table import steps_table
+    from fingervision.testbed.manual.step_running import run_sequence, step_limits, steps_table
     from fingervision.testbed.motion.step_checks import planned_sequence
 
     data, limits = read_steps(steps_toml), step_limits(bed_name)

@@ -27,7 +27,7 @@ from fingervision.testbed.clocks.clock import Clock, HostClock, VirtualClock
 from fingervision.testbed.device_kinds import Kind, kind_of
 from fingervision.testbed.force_sensor import ForceSensor
 from fingervision.testbed.motion.soft_limits import SoftLimits
-from fingervision.testbed.operators.operator_kinds import AtTheBed, operator_of
+from fingervision.testbed.operator import AtTheBed, operator_of
 from fingervision.testbed.simulation.gripper import SimulatedGripper
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 from fingervision.testbed.simulation.recording_actuator import Followed

@@ -6,7 +6,7 @@ from pathlib import Path
 from fingervision.domain.step_data import StepData
 from fingervision.storage.steps_toml import read_steps
 from fingervision.testbed.motion.motion_profile import profile
-from fingervision.testbed.motion.published_stage import PUBLISHED
+from fingervision.testbed.motion.move_limits import PUBLISHED
 
 BOARD = """schema = 1
 port = "{port}"

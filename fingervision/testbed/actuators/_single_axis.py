@@ -18,12 +18,11 @@ from fingervision.domain.errors import DeviceError, FingervisionError, LimitErro
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, RefusedError, StageLimits
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion import stated_limits
-from fingervision.testbed.motion.move_limits import FreeMoves, check_move, check_speed
+from fingervision.testbed.motion.move_limits import LIMIT_KEYS, FreeMoves, check_move, check_speed, stage_limits
 from fingervision.testbed.reading import Reading
 
 T = TypeVar("T")
-KEYS = (*stated_limits.KEYS, "zero_mm", "reversed")
+KEYS = (*LIMIT_KEYS, "zero_mm", "reversed")
 # A motion counts as stuck after PATIENCE times its duration plus PATIENCE_S; homing, of unknown length, after HOME_S.
 PATIENCE, PATIENCE_S, HOME_S = 1.5, 2.0, 120.0
 # A stepper loses steps by whole electrical cycles of four full steps: 20 um for 200 steps per turn and a lead of 1 mm.
@@ -53,7 +52,7 @@ class AxisSettings:
 
 def stated_axis(section: Section) -> AxisSettings:
     """Read the settings listed in `KEYS`."""
-    limits = stated_limits.stated_limits(section)
+    limits = stage_limits(section)
     return AxisSettings(limits, section.number("zero_mm", 0.0), -1.0 if section.flag("reversed") else 1.0)
 
 
@@ -285,4 +284,4 @@ def in_a_line(error: Exception) -> str:
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
     """Limits of the stage, for checking a plan without opening the test bed."""
-    return FreeMoves(stated_limits.stated_limits(section))
+    return FreeMoves(stage_limits(section))

@@ -11,22 +11,19 @@ from fingervision.storage.steps_toml import read_steps
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.board import controller_settings, wire
-from fingervision.testbed.board.board import Board
+from fingervision.testbed.board.board import KEY, Board, board_of
 from fingervision.testbed.board.controller_settings import Codes, Waits, codes_of, waits_of
 from fingervision.testbed.board.motions import Motions, Run
 from fingervision.testbed.board.port import fingervision_at
-from fingervision.testbed.board.shared import KEY, board_of
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion import published_stage
-from fingervision.testbed.motion.move_limits import check_move, check_speed
-from fingervision.testbed.motion.published_stage import stage_limits
+from fingervision.testbed.motion.move_limits import PUBLISHED, PUBLISHED_KEYS, check_move, check_speed, stage_limits
 from fingervision.testbed.motion.step_checks import planned
 from fingervision.testbed.motion.step_route import jog_step, route
 from fingervision.testbed.reading import Reading
 
 SIMULATED = False
-KEYS = (KEY, "steps", *published_stage.KEYS, *controller_settings.KEYS)
+KEYS = (KEY, "steps", *PUBLISHED_KEYS, *controller_settings.KEYS)
 # A motion counts as stuck if it takes longer than PATIENCE times the duration of its profile, plus PATIENCE_S.
 PATIENCE, PATIENCE_S = 1.5, 1.0
 READ_EVERY_S = 0.005
@@ -236,7 +233,7 @@ def holder(section: Section, folder: Path) -> int | None:
 
 def without_hardware(section: Section, folder: Path) -> Routes:
     """Limits of the stage, for checking a plan without opening the test bed."""
-    return Routes(read_steps(folder / section.word("steps")), stage_limits(section))
+    return Routes(read_steps(folder / section.word("steps")), stage_limits(section, PUBLISHED))
 
 
 def build(section: Section, context: BuildContext) -> BoardActuator:
@@ -247,4 +244,4 @@ def build(section: Section, context: BuildContext) -> BoardActuator:
     if not board.settings.moves:
         board.close()
         section.refuse(KEY, "must have a motor controller on its lines, but has a force sensor only: add its lines.")
-    return BoardActuator(board, data, stage_limits(section), codes, waits, context.clock)
+    return BoardActuator(board, data, stage_limits(section, PUBLISHED), codes, waits, context.clock)

@@ -1,6 +1,7 @@
 """A micrometer screw that a person turns; the person types in its readings."""
 
-from math import isfinite
+from dataclasses import replace
+from math import inf, isfinite
 from pathlib import Path
 
 from fingervision.domain.errors import LimitError, StateError
@@ -8,7 +9,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion.move_limits import FreeMoves, check_move
+from fingervision.testbed.motion.move_limits import FreeMoves, check_move, stage_limits
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.terminal import TERMINAL, Terminal
 
@@ -133,14 +134,8 @@ def _number(words: str, otherwise: float) -> float | None:
 
 
 def _limits(section: Section) -> StageLimits:
-    lower_mm = section.number("lower_mm")
-    return StageLimits(
-        lower_mm=lower_mm,
-        upper_mm=section.number("upper_mm", above=lower_mm),
-        speed_mm_s=section.number("speed_mm_s", SPEED_MM_S, above=0.0),
-        force_n=float("inf"),
-        accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
-    )
+    given = {"speed_mm_s": SPEED_MM_S, "accuracy_mm": ACCURACY_MM, **section.values}
+    return replace(stage_limits(replace(section, values=given)), force_n=inf)
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:

@@ -11,7 +11,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion.move_limits import FreeMoves, check_move, check_speed
+from fingervision.testbed.motion.move_limits import FreeMoves, check_move, check_speed, stage_limits
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import Motion
@@ -21,8 +21,7 @@ KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "force_n", "encoder_step_mm", "acc
 SIMULATED = True
 # Hricko & Havlik (2015), section 3: stroke 10 mm, 400 mm/s, encoder 30 um, accuracy +-90 um, 5.5 N. The gripper is at
 # rest at position 0.
-LOWER_MM, UPPER_MM = -2.0, 8.0
-SPEED_MM_S, FORCE_N, ENCODER_STEP_MM, ACCURACY_MM = 400.0, 5.5, 0.03, 0.09
+LIMITS = StageLimits(-2.0, 8.0, speed_mm_s=400.0, force_n=5.5, accuracy_mm=0.09, encoder_step_mm=0.03)
 # Rate at which the board reads the encoder by itself; shortest answer time, and mean of the additional time (serial
 # port at 115200 baud; a median of 1.2 ms was measured with an ATmega328P).
 RATE_HZ = 200.0
@@ -181,26 +180,14 @@ class SimulatedActuator:
             raise StateError("The actuator must be at rest before a new motion, but is still moving: stop it first.")
 
 
-def _limits(section: Section) -> StageLimits:
-    lower_mm = section.number("lower_mm", LOWER_MM)
-    return StageLimits(
-        lower_mm=lower_mm,
-        upper_mm=section.number("upper_mm", UPPER_MM, above=lower_mm),
-        speed_mm_s=section.number("speed_mm_s", SPEED_MM_S, above=0.0),
-        force_n=section.number("force_n", FORCE_N, above=0.0),
-        accuracy_mm=section.number("accuracy_mm", ACCURACY_MM, low=0.0),
-        encoder_step_mm=section.number("encoder_step_mm", ENCODER_STEP_MM, low=0.0),
-    )
-
-
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
     """Limits of the stage, for checking a plan without opening the test bed."""
-    return FreeMoves(_limits(section))
+    return FreeMoves(stage_limits(section, LIMITS))
 
 
 def build(section: Section, context: BuildContext) -> SimulatedActuator:
     """Build the actuator from its section of the configuration."""
-    limits = _limits(section)
+    limits = stage_limits(section, LIMITS)
     rng = np.random.default_rng([context.seed, 1])
     # The controller is assumed to have the test bed's limits as its own, so that positioning errors do not lead beyond
     # these limits.

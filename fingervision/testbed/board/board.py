@@ -9,9 +9,12 @@ from typing import NoReturn
 
 from fingervision.domain.board_settings import BoardSettings, Role
 from fingervision.domain.errors import DeviceError, FingervisionError
+from fingervision.storage.board_toml import read_board
+from fingervision.storage.toml_section import Section
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.link import ASK_EVERY_S, BoardLink, BoardRefusalError
 from fingervision.testbed.board.port import opened_port
+from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.board_clock import FEWEST, JoinedClock
 from fingervision.testbed.clocks.clock import Clock
 
@@ -261,3 +264,22 @@ def _wait_for_clock(board: Board, link: BoardLink, clock: Clock) -> None:
                 f"{board.name} must send readable replies, but most of them are damaged: check its cable."
             )
         board.wait(ASK_EVERY_S)
+
+
+KEY = "board"
+
+
+def board_of(section: Section, context: BuildContext) -> Board:
+    """Return the board named by the key `board` of a part's section; it is opened once.
+
+    Raises
+    ------
+    DataError, DeviceError, InputFileError
+        The board's settings are invalid, or the board cannot be opened.
+    """
+    path = context.folder / section.word(KEY)
+    name = f"{KEY} {path.resolve()}"
+    if name not in context.shared:
+        context.shared[name] = opened(read_board(path), context.clock)
+    board: Board = context.shared[name]
+    return board.hold()

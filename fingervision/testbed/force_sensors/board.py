@@ -7,8 +7,7 @@ import numpy as np
 
 from fingervision.domain.errors import DeviceError
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.board.board import Board
-from fingervision.testbed.board.shared import KEY, board_of
+from fingervision.testbed.board.board import KEY, Board, board_of
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.reading import Reading

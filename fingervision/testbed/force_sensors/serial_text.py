@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.build_context import BuildContext
-from fingervision.testbed.motion.stated_limits import ENDLESS_N
+from fingervision.testbed.motion.move_limits import ENDLESS_N
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.text_protocol import sensor
 from fingervision.testbed.text_protocol.sensor import TextSensor, opened_sensor

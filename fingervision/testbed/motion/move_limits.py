@@ -1,8 +1,10 @@
-"""Check a requested motion against the limits of the stage."""
+"""Limits of a stage: what a configuration states of them, and what a motion must keep."""
 
 from dataclasses import dataclass
+from math import inf
 
 from fingervision.domain.errors import LimitError
+from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import StageLimits
 
 
@@ -54,3 +56,38 @@ class FreeMoves:
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
         """Refuse motions beyond the limits of the stage."""
         check_move(self.limits, to_mm, speed_mm_s)
+
+
+LIMIT_KEYS = (
+    "lower_mm", "upper_mm", "speed_mm_s", "force_n", "accuracy_mm", "encoder_step_mm", "repeatability_mm", "settling_s",
+)  # fmt: skip
+ENDLESS_N = 1e9
+"""Value used for a force limit that is not stated."""
+
+
+def stage_limits(section: Section, default: StageLimits | None = None) -> StageLimits:
+    """Limits of a stage from its section of the configuration.
+
+    Without defaults, the range and the speed must be stated, the force is unlimited, and the stage is exact.
+    """
+
+    def number(key: str, otherwise: float | None = None, above: float | None = None) -> float:
+        low = 0.0 if above is None else -inf
+        return section.number(key, otherwise if default is None else getattr(default, key), low=low, above=above)
+
+    lower_mm = section.number("lower_mm", None if default is None else default.lower_mm)
+    return StageLimits(
+        lower_mm=lower_mm,
+        upper_mm=number("upper_mm", above=lower_mm),
+        speed_mm_s=number("speed_mm_s", above=0.0),
+        force_n=number("force_n", ENDLESS_N, above=0.0),
+        accuracy_mm=number("accuracy_mm", 0.0),
+        encoder_step_mm=number("encoder_step_mm", 0.0),
+        repeatability_mm=number("repeatability_mm", 0.0),
+        settling_s=number("settling_s", 0.0),
+    )
+
+
+# Hricko and Havlik (2015), section 3: stroke 10 mm, 400 mm/s, positioning accuracy +-90 um, 5.5 N.
+PUBLISHED = StageLimits(lower_mm=0.0, upper_mm=10.0, speed_mm_s=400.0, force_n=5.5, accuracy_mm=0.09)
+PUBLISHED_KEYS = LIMIT_KEYS[:5]

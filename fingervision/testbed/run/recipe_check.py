@@ -10,8 +10,7 @@ from fingervision.domain.recipe import Recipe
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.planned_bed import PlannedBed
 from fingervision.testbed.run.motion_segments import Close, Go, Leg, Swing
-from fingervision.testbed.run.plan import SLACK_MM, Timed, plan, timed_segments
-from fingervision.testbed.run.plan_feasibility import check_moves
+from fingervision.testbed.run.plan import SLACK_MM, Timed, check_moves, plan, timed_segments
 from fingervision.testbed.run.run_folder import BYTES_PER_PX
 
 POSITIONS = 41

@@ -17,8 +17,7 @@ from fingervision.testbed.manual import manual_control
 from fingervision.testbed.run import step_executor
 from fingervision.testbed.run.controls import Controls
 from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
-from fingervision.testbed.run.plan import Plan, plan
-from fingervision.testbed.run.plan_feasibility import check_moves
+from fingervision.testbed.run.plan import Plan, check_moves, plan
 from fingervision.testbed.run.run_folder import BedRunFolder
 from fingervision.testbed.run.run_record import Counts, OnRow, RunRecord
 from fingervision.testbed.run.safety_monitor import Say, Watch

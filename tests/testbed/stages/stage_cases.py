@@ -132,7 +132,8 @@ CASES: dict[str, Case] = {
         1.0,
         virtual=False,
     ),
-    "micromanager": Case(Demo, f'{MICROMANAGER}device = "Stage"\n', "mm_test_adapters", virtual=False),
+    # Each position of the ramp is reached by a thread of the stage, which a loaded computer delays.
+    "micromanager": Case(Demo, f'{MICROMANAGER}device = "Stage"\n', "mm_test_adapters", 1.0, virtual=False),
     "micromanager_xy": Case(
         Demo,
         f'{MICROMANAGER}device = "XY"\naxis = "y"\nspeed_property = "Velocity"\nspeed_per_mm_s = 1\n',

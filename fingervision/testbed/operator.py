@@ -1,12 +1,32 @@
-"""Kinds of operators: a person at the terminal, or an immediate action for a simulated camera."""
+"""The operator of a test bed: a person at the terminal, or an immediate action for a simulated camera."""
 
 from dataclasses import replace
+from typing import Protocol
 
 from fingervision.domain.errors import StateError
 from fingervision.testbed.camera import BedCamera
 from fingervision.testbed.cameras.simulated import SHIFT_MM, SimulatedCamera
-from fingervision.testbed.operators.operator import Operator
 from fingervision.testbed.terminal import TERMINAL
+
+
+class Operator(Protocol):
+    """Protocol of the operator: a person at a real test bed; a simulated test bed performs the steps at once."""
+
+    def turn_part(self) -> None:
+        """Turn the part by 180 degrees in the picture."""
+        ...
+
+    def shift_picture(self) -> None:
+        """Shift the camera or the part, so that the fingers appear elsewhere in the picture."""
+        ...
+
+    def put_in_slot(self, size_mm: float) -> None:
+        """Put a reference slot of known width in place of the gripper, in the plane of the fingers."""
+        ...
+
+    def take_out_slot(self) -> None:
+        """Put the gripper back in place of the slot."""
+        ...
 
 
 class AtTheBed:
