@@ -113,6 +113,7 @@ def test_the_stage_keeps_the_contract(case: Case, device: Any, virtual: None, tm
 
 def test_a_stop_in_motion_stops_the_stage_while_it_is_asked(bed: Bed) -> None:
     bed.actuator.move(5.0, 2.0)
+    assert bed.actuator.busy  # and the device has heard it before any virtual time passes
     stopped, answers = threading.Event(), list[float]()
 
     def ask() -> None:
