@@ -65,8 +65,10 @@ class TextStage(SingleAxis):
             self._awaited = None
         busy = self._actions.get("busy")
         if busy is None:
+            # The time before the question: on a busy computer, the answer may be old when it is looked at.
+            asked_s = self._clock.now_s()
             self._position_mm()
-            return self._clock.now_s() - self._since_s < STILL_S
+            return asked_s - self._since_s < STILL_S
         found = self._talk.ask(busy)
         if "moving_bits" in busy.more:
             return bool(int(number_in(found, self.name)) & int(busy.more["moving_bits"]))
