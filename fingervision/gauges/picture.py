@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
 from fingervision.domain.frame import Coding, Frame
-from fingervision.vision.coding_error import EIGHT_BITS, displaced_px
+from fingervision.vision.coded_picture import EIGHT_BITS, displaced_px
 from fingervision.vision.grey import GreyImage, to_grey, top_level
 from fingervision.vision.pipeline import Settings
 

@@ -15,7 +15,7 @@ from fingervision.vision.edges import EdgePoints
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.residuals import SHARED_POINTS
-from fingervision.vision.wall_width import WIDER
+from fingervision.vision.side_wall import WIDER
 
 Floats = NDArray[np.float64]
 

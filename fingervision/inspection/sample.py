@@ -22,10 +22,9 @@ from fingervision.inspection.noise_bound import GOOD_BLUR_PX, GOOD_NOISE
 from fingervision.measuring.camera_learning import learnt_first
 from fingervision.measuring.scale import Scale
 from fingervision.vision.binarise import binarise
-from fingervision.vision.denoise import denoise
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import SMEARED
-from fingervision.vision.grey import to_grey, top_level
+from fingervision.vision.grey import denoise, to_grey, top_level
 from fingervision.vision.pipeline import Settings, look_closely, measure_frame
 
 Floats = NDArray[np.float64]

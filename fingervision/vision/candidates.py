@@ -1,20 +1,108 @@
-"""Candidate pairs of fingers in the dark or light class of a picture, split by one threshold or by the local mean."""
+"""Candidate pairs of fingers in the dark or light class of a picture, split by one threshold or by the local mean.
+
+Detection of an object, such as a cable, that crosses the fingers and hides their ends in the binary picture.
+
+If an object crosses the fingers, their apparent tips are the edge of this object. Beyond a true tip there is background
+or some other object; a piece of the same width that continues along the same two lines is the finger itself.
+
+Recognise a space between two strokes of a letter, which looks like the gap between two fingers.
+
+If the paper of a printed text is taken for the objects, and the letters for the background, the spaces inside and
+between letters look like bars that extend from the picture's border. Between two apparent bars in a text lies a part of
+a letter, and the picture contains other parts of the same size. Between two fingers lies the background, which is a
+single region.
+"""
 
 from collections.abc import Iterator
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.gap import NoGap
+from fingervision.domain.loops import loop
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise_local
-from fingervision.vision.crossing import CROSSED, is_crossed
-from fingervision.vision.fingers import MORE_THAN_TWO, UNLIKE, CoarseFingers, find_fingers
-from fingervision.vision.gap_company import LETTERS, has_company
+from fingervision.vision.coarse_fingers import CoarseFinger, CoarseFingers
+from fingervision.vision.fingers import MORE_THAN_TWO, UNLIKE, find_fingers
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.part_removal import is_likelier, looks_parted, without_part
 from fingervision.vision.settings import Settings
+from fingervision.vision.way_between import inner_crossing
+
+# Distance beyond the tip within which a continuation of the finger is searched (pixels, and as a multiple of the
+# measuring height).
+BEYOND_PX, BEYOND_HEIGHTS = 40, 8.0
+# Least number of rows of a continuation, in each of which this share of the finger's width is covered, and the pixels
+# at this distance from both sides are not.
+FEWEST_ROWS, FILLED_SHARE, SIDE_PX = 5, 0.9, 5
+# Range of heights below the tip in which lines are fitted to the finger's two sides (in units of the measuring height).
+FROM_HEIGHTS, TO_HEIGHTS = 1.0, 4.0
+
+CROSSED = NoGap(
+    Status.NO_FINGERS,
+    "An object lies across the fingers and hides their tips: remove the object, or give a region without it (--roi).",
+)
+
+_rows_beyond = loop("candidates_rows_beyond")
+
+
+def is_crossed(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: float) -> bool:
+    """Whether either finger continues beyond its apparent tip.
+
+    Parameters
+    ----------
+    mask : ndarray of uint8, shape (height, width)
+        Non-zero where the fingers may be.
+    fingers : CoarseFingers
+        The fingers as found in the mask.
+    below_tip_px : float
+        Distance of the measuring point below the tip.
+    """
+    upright = np.asarray(fingers.orientation.view(mask), dtype=np.uint8)
+    return any(_goes_on(upright, finger, below_tip_px) for finger in (fingers.left, fingers.right))
+
+
+def _goes_on(upright: NDArray[np.uint8], finger: CoarseFinger, below_tip_px: float) -> bool:
+    top, reach = finger.top_along_px, int(max(BEYOND_PX, BEYOND_HEIGHTS * below_tip_px))
+    heights = (FROM_HEIGHTS * below_tip_px, TO_HEIGHTS * below_tip_px)
+    return bool(_rows_beyond(upright, finger.outline, top, *heights, reach) >= FEWEST_ROWS)
+
+
+# Largest ratio of lengths of objects of the same size, and least number of such objects that indicates a text; a
+# mechanism around its gap has only a few openings of this size.
+SAME_SIZE, FEWEST_OTHERS = 2.5, 5
+
+LETTERS = NoGap(
+    Status.NO_FINGERS,
+    "The object between the two supposed fingers is one of several objects of the same size, as in a text: give the "
+    "region of the two fingers (--roi).",
+)
+
+
+_same_size = loop("candidates_same_size")
+
+
+def has_company(mask: NDArray[np.uint8], fingers: CoarseFingers, below_tip_px: float) -> bool:
+    """Whether the object between two fingers is one of several objects of similar size.
+
+    Parameters
+    ----------
+    mask : ndarray of uint8, shape (height, width)
+        Non-zero where the fingers may be.
+    fingers : CoarseFingers
+        The fingers as found in the mask.
+    below_tip_px : float
+        Distance of the measuring point below the tip.
+    """
+    height = max(finger.top_along_px for finger in (fingers.left, fingers.right)) + below_tip_px
+    across = [inner_crossing(finger.outline, height)[0] for finger in (fingers.left, fingers.right)]
+    x, y = (round(place) for place in fingers.orientation.to_pixels(0.5 * sum(across), height))
+    if not (0 <= x < mask.shape[1] and 0 <= y < mask.shape[0]):
+        return False
+    return int(_same_size(np.ascontiguousarray(mask), x, y)) > FEWEST_OTHERS
+
 
 # Least difference of the two classes, in units of the standard deviation within the classes.
 SEPARATION_FLOOR = 3.0

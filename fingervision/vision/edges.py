@@ -17,6 +17,7 @@ from fingervision.vision.edge_filters import (
     SMALLEST_BLUR_PX,
     EdgeFilters,
     Lines,
+    curvature_gain,
     edge_filters,
     reach_for,
 )
@@ -26,7 +27,6 @@ from fingervision.vision.grey import GreyImage
 from fingervision.vision.line_levels import first_blur, first_position, line_levels
 from fingervision.vision.median import middle
 from fingervision.vision.noise_correlation import flat_noise
-from fingervision.vision.outline_blur import curvature_gain
 from fingervision.vision.profile_lines import INNER, IS_ROW, PLACES, ProfileLines
 
 Floats = NDArray[np.float64]

@@ -22,20 +22,19 @@ from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges, local_change
 from fingervision.vision.coded_picture import CodedPicture, coded_picture
-from fingervision.vision.denoise import denoise
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import LEAST_SURE_PX, TOO_ROUGH, measure_gap
-from fingervision.vision.grey import GreyImage, full_scale, to_grey, top_level
+from fingervision.vision.grey import GreyImage, denoise, full_scale, to_grey, top_level
 from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
-from fingervision.vision.longer_flanks import is_surer, with_longer_flanks
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
 from fingervision.vision.picture_memory import keep_picture_memory
 from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import u_gap_response_px
+from fingervision.vision.roughness import is_surer, with_longer_flanks
 from fingervision.vision.settings import LINEAR_CAMERA, Settings
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold

@@ -12,12 +12,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.beside_edge import without_additions
-from fingervision.vision.blur_uncertainty import Displacement, not_displaced
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
-from fingervision.vision.edge_moves import are_of_size, beyond_wall, moved_edges, stated_marks, unsure_edges
+from fingervision.vision.edge_moves import (
+    are_of_size,
+    beyond_wall,
+    moved_edges,
+    stated_marks,
+    unsure_edges,
+    without_additions,
+)
 from fingervision.vision.edges import EdgePoints
-from fingervision.vision.flank_fits import MODEL_LEAVES, MODEL_TIMES, Flank, FlankFits, best_fit
 from fingervision.vision.grey import GreyImage
 from fingervision.vision.mean_profile import (
     BIN_PX,
@@ -27,20 +31,35 @@ from fingervision.vision.mean_profile import (
     MeanProfile,
     mean_profile,
 )
-from fingervision.vision.narrow_wall import SIGNIFICANT, with_narrow_wall
 from fingervision.vision.profile_lines import INNER, ROWS
-from fingervision.vision.profile_models import FADING, GLARE, SHADOW, STEP, WALL, ProfileFit
+from fingervision.vision.profile_models import (
+    FADING,
+    GLARE,
+    MODEL_LEAVES,
+    MODEL_TIMES,
+    SHADOW,
+    STEP,
+    WALL,
+    Flank,
+    FlankFits,
+    ProfileFit,
+    best_fit,
+    symmetric_squares,
+)
 from fingervision.vision.sharpening import U_SHIFT, Profile, is_curved, sharpening
-from fingervision.vision.symmetric_spread import symmetric_squares
-from fingervision.vision.trail import with_trail
-from fingervision.vision.wall_width import (
+from fingervision.vision.side_wall import (
+    SIGNIFICANT,
     WIDER,
+    Displacement,
     are_broader_together,
     are_outer_flanks_in_view,
     is_surely_broader,
+    not_displaced,
     squared_blurs,
     wall_limits_px,
+    with_narrow_wall,
 )
+from fingervision.vision.trail import with_trail
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 # of a codec's blocks in common.
 LAGS = 8
 # Number of neighbouring points that have a codec error in common, in addition to the displacement of a whole flank
-# (`coding_error`). Measured on videos of a moving gripper at 1 to 8 Mbit/s and on JPEG of quality 70 to 95
+# (`coded_picture`). Measured on videos of a moving gripper at 1 to 8 Mbit/s and on JPEG of quality 70 to 95
 # (`tests/benchmarks/accuracy.py --only jpeg`, `python -m tests.benchmarks.compressed_video`).
 SHARED_POINTS = {Coding.LOSSLESS: 1.0, Coding.INTRAFRAME: 2.5, Coding.INTERFRAME: 4.0}
 # Ratio of the weighted to the true variance of normal residuals under the biweight (mean of w r^2 / mean of w).

@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.vision.edge_filters import blurred_step
+from fingervision.vision.edge_filters import blurred_step, curvature_gain
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.facing import facing_lines
 from fingervision.vision.grey import GreyImage
-from fingervision.vision.outline_blur import curvature_gain
 from fingervision.vision.profile_lines import ROWS
 
 Floats = NDArray[np.float64]

@@ -17,7 +17,7 @@ from skimage.measure import find_contours
 
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.binarise import binarise
-from fingervision.vision.denoise import denoise
+from fingervision.vision.grey import denoise
 from fingervision.vision.outlines import find_outlines
 
 DENOISE: dict[str, Callable[[np.ndarray], np.ndarray]] = {

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingervision.vision.binarise import LARGE_PX, binarise, binarise_local
-from fingervision.vision.denoise import denoise
-from fingervision.vision.grey import full_scale, to_grey
+from fingervision.vision.grey import denoise, full_scale, to_grey
 
 
 @given(dark=st.integers(0, 200), contrast=st.integers(20, 55), seed=st.integers(0, 1000))

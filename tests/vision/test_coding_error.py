@@ -7,7 +7,7 @@ import pytest
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.gap import FingerEdge, GapMeasurement
-from fingervision.vision.coding_error import displaced_px, with_coding_error
+from fingervision.vision.coded_picture import displaced_px, with_coding_error
 
 STEP, CONTRAST = 8.0, 130.0
 EDGE = FingerEdge(100.0, 120.0, 110.0, 0.0, 0.0, 0.0, 1.0, CONTRAST)

@@ -10,7 +10,7 @@ from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.region import Region
-from fingervision.vision.coding_error import displaced_px
+from fingervision.vision.coded_picture import displaced_px
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 from tests.benchmarks.compressed_video import Shot, shots
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingervision.vision.one_sided_blur import doubtful_offsets
+from fingervision.vision.rigid_outline import doubtful_offsets
 
 MIDDLES = np.array([[0.0, 0, 0, 40, 40, 40, 20, 20], [10, 30, 50, 10, 30, 50, 0, 60]], dtype=float)
 NORMALS = np.array([[-1.0, -1, -1, 1, 1, 1, 0, 0], [0, 0, 0, 0, 0, 0, -1, 1]], dtype=float)

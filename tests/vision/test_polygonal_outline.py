@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from fingervision.vision.corner_blur import corner_half_level
 from fingervision.vision.outline_points import OutlinePoints
-from fingervision.vision.polygonal_outline import polygonal_measuring_point
+from fingervision.vision.polygon import corner_half_level
+from fingervision.vision.polygonal_outline import polygonal_measuring_point, straight_runs
 from fingervision.vision.profile_lines import INNER_SIDE, OUTER_SIDE, TIP_SIDE
-from fingervision.vision.straight_runs import straight_runs
 
 BELOW_PX = 10.2
 # Standard deviation of the drawn points (pixels).

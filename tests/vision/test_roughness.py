@@ -14,11 +14,10 @@ from fingervision.domain.gap import GapMeasurement
 from fingervision.vision.finger_end import FingerEnd, fit_finger_end
 from fingervision.vision.first_guess import first_guess
 from fingervision.vision.gap import TOO_ROUGH
-from fingervision.vision.longer_flanks import is_surer
 from fingervision.vision.measuring_point import measuring_point, squared
 from fingervision.vision.outline_points import OutlinePoints
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
-from fingervision.vision.roughness import Roughness, best_linear, roughness, with_roughness
+from fingervision.vision.roughness import Roughness, best_linear, is_surer, roughness, with_roughness
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX, plain, texture
 from tests.benchmarks.camera_artefacts.optics import Surface
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import ndtr
 
-from fingervision.vision.symmetric_spread import symmetric_squares
+from fingervision.vision.profile_models import symmetric_squares
 
 T = np.arange(-16.0, 16.0, 0.5) + 0.25
 WEIGHT = np.full(T.size, 70.0 / 4.0)

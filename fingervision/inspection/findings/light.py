@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 from fingervision.inspection.blocks import HEAVY
 from fingervision.inspection.finding import Finding, Severity, weighed, without
 from fingervision.inspection.findings.exposure import DIM, WANTED
-from fingervision.inspection.ground_slope import ground_slope
+from fingervision.inspection.ground_slope import StepProfile, fit_step, ground_slope
 from fingervision.inspection.noise_bound import GOOD_NOISE
 from fingervision.inspection.plateaus import plateaus
-from fingervision.inspection.profile_fit import StepProfile, fit_step
 from fingervision.inspection.sample import Sample
 from fingervision.vision.flank_profiles import flank_profile
 

@@ -13,6 +13,6 @@ static double stored_level(const double *light, int64_t levels, double wanted) {
 }
 
 /* Difference of the stored levels that correspond to two lights: table of light, highest level, both lights. */
-LOOP(coding_error_stored_difference, "Fidd", "d") {
+LOOP(coded_picture_stored_difference, "Fidd", "d") {
     out[0].d = fabs(stored_level(FLOATS(0), in[1].i + 1, in[3].d) - stored_level(FLOATS(0), in[1].i + 1, in[2].d));
 }

@@ -13,18 +13,18 @@ static double squares_of_run(const double *sums, int64_t first, int64_t last) {
     return squares_about_line(m);
 }
 
-LOOP(straight_runs_squares, "F", "d") { out[0].d = squares_about_line(FLOATS(0)); }
+LOOP(polygonal_outline_squares, "F", "d") { out[0].d = squares_about_line(FLOATS(0)); }
 
-/* Sums of squares of all runs of FEWEST_POINTS points: cumulative sums (n + 1, 6); sums of squares (n - FEWEST_POINTS + 1).
+/* Sums of squares of all runs of FEWEST_OF_RUN points: cumulative sums (n + 1, 6); sums of squares (n - FEWEST_OF_RUN + 1).
    */
-LOOP(straight_runs_windows, "Ff", "") {
+LOOP(polygonal_outline_windows, "Ff", "") {
     for (int64_t first = 0; first < in[1].n; first++)
-        FLOATS(1)[first] = squares_of_run(FLOATS(0), first, first + FEWEST_POINTS);
+        FLOATS(1)[first] = squares_of_run(FLOATS(0), first, first + FEWEST_OF_RUN);
 }
 
 /* Division of the first k points with the lowest cost, for every k. Arguments: cumulative sums (n + 1, 6), noise; result,
    for every k the start of the last run, or -1 if the last point is left out (n + 1). */
-LOOP(straight_runs_cheapest, "Fdj", "") {
+LOOP(polygonal_outline_cheapest, "Fdj", "") {
     int64_t n = in[2].n - 1, *last_run = INTS(2);
     double *cost = floats(n + 1);
     cost[0] = 0.0;
@@ -32,7 +32,7 @@ LOOP(straight_runs_cheapest, "Fdj", "") {
     for (int64_t k = 1; k <= n; k++) {
         double least = 0.0;
         int64_t best = -1;
-        for (int64_t first = 0; first + FEWEST_POINTS <= k; first++) {
+        for (int64_t first = 0; first + FEWEST_OF_RUN <= k; first++) {
             double by_run = cost[first] + squares_of_run(FLOATS(0), first, k) / in[1].d + PRICE_OF_RUN;
             if (best >= 0 && !(by_run < least)) continue;
             least = by_run;
