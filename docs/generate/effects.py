@@ -4,7 +4,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from fingervision.diagnosis.report.effect_figure import effect_figure
+from fingervision.diagnosis.report.figure_files import effect_figure
 from fingervision.domain.effect import Effect, Stage
 from fingervision.effects import catalogue
 

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, cast
 
 import fingervision.batch
-from fingervision.batch.digest import Digest
-from fingervision.batch.task import Outcome
+from fingervision.batch.task import Digest, Outcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

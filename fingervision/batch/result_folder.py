@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from uuid import uuid4
 
-from fingervision.batch.digest import Digest
+from fingervision.batch.task import Digest
 from fingervision.storage.durable import replaced
 from fingervision.storage.plain_file import json_of
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fingervision.batch.digest import Digest, thinned
-from fingervision.batch.task import Outcome
+from fingervision.batch.task import Digest, Outcome, thinned
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

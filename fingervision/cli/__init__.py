@@ -66,7 +66,7 @@ class Commands(Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; an error about an argument states the name of the command-line option."""
-        from fingervision.interface.argument_names import command_words
+        from fingervision.interface.argument_checks import command_words
 
         try:
             with command_words():

@@ -162,7 +162,7 @@ def _calibrate(
 ) -> None:
     """Call `fingervision.calibrate`, write its result and print it."""
     from fingervision.interface.calibrate import calibrate
-    from fingervision.interface.calibration_report import as_json as for_programs
+    from fingervision.interface.calibration import as_json as for_programs
     from fingervision.storage.calibration_json import refuse_foreign
 
     refuse_foreign(out)
@@ -307,7 +307,7 @@ def response(**options: Any) -> None:
     --edges estimates a power law to about 5 % from the shape of straight edges, if the camera does not sharpen.
     """
     from fingervision.cli._measuring_response import measure_response
-    from fingervision.interface.argument_names import python_words
+    from fingervision.interface.argument_checks import python_words
 
     with python_words():
         measure_response(**options)
@@ -319,7 +319,7 @@ def response(**options: Any) -> None:
 @json_option("Print the result as JSON.")
 def check(calibration: Path, items: Sequence[str], u_size_mm: float, roi: str | None, as_json: bool) -> None:
     """Measure an object of known size with an existing calibration and say whether both agree (E_n number)."""
-    from fingervision.interface.argument_names import python_words
+    from fingervision.interface.argument_checks import python_words
 
     with python_words():
         from fingervision.interface.calibration import Calibration
@@ -363,7 +363,7 @@ def repeat(tables: Sequence[Path], tolerance_mm: float | None, by_input: bool, a
     The scatter of the frames within a recording gives the repeatability. The differences between recordings of the same
     object, set up anew each time, give the reproducibility.
     """
-    from fingervision.interface.argument_names import python_words
+    from fingervision.interface.argument_checks import python_words
 
     with python_words():
         from calib.gauge_study import gauge_study, refuse_moving, verdict

@@ -102,7 +102,7 @@ def _changes(
     """Compare with a healthy recording, and print what changed."""
     import json
 
-    from fingervision.interface.healthy_reference import CHANGES, changes_since
+    from fingervision.interface.diagnosis import CHANGES, changes_since
     from fingervision.storage.out_folder import new_out_folder
 
     out = results_folder(out, measured)

@@ -63,8 +63,7 @@ def command(name: str | None, figure: Path | None) -> None:
     for p in effect.parameters:
         click.echo(f"  {p.words}: {p.name}, {p.unit or 'ratio'}, {p.lower:g} to {p.upper:g}, narrowed by the data")
     if figure is not None:
-        from fingervision.diagnosis.report.effect_figure import effect_figure
-        from fingervision.diagnosis.report.vector_figure import png_bytes
+        from fingervision.diagnosis.report.figure_files import effect_figure, png_bytes
 
         figure.write_bytes(png_bytes(effect_figure(name)))
         click.echo(f"  picture   {figure}")

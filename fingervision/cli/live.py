@@ -206,7 +206,7 @@ def command(
     way = access(host, port, password_file, tls_cert, tls_key)
     showing = Showing(page=not no_page, json_lines=as_json, way=way, record=no_page and out is not None)
     if bed_name is not None:
-        from fingervision.live.bed.opening import opened_bed
+        from fingervision.live.bed.bench import opened_bed
 
         bed_capture, bed_choices = opened_bed(bed_name, hide, choices)
         run(bed_capture, bed_choices, out or LIVE_FOLDER, showing, beside)

@@ -14,9 +14,8 @@ from fingervision.diagnosis.inference.verdict import isolated, limited_noises_mm
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
-from fingervision.diagnosis.report.clock_words import within_clock
-from fingervision.diagnosis.report.residual_channels import by_channel, places
-from fingervision.diagnosis.report.sentences import EDGES
+from fingervision.diagnosis.report.residual_localization import by_channel, places
+from fingervision.diagnosis.report.sentences import EDGES, within_clock
 from fingervision.domain.effect import Array
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Place

@@ -15,8 +15,7 @@ from fingervision.diagnosis.inference.refitted_search import Refitted, refitted_
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.report.diagnosis_report import diagnosis_report
-from fingervision.diagnosis.report.positioning_of_data import positioning_of_data
-from fingervision.diagnosis.report.positioning_report import PositioningReport
+from fingervision.diagnosis.report.positioning_of_data import PositioningReport, positioning_of_data
 from fingervision.domain.effect import Array
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import DiagnosisReport

@@ -18,8 +18,7 @@ from fingervision.gauges.kinds import measured_together
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.gauges.quantities import Cell
-from fingervision.gauges.reading import Mark, Reading, unread
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.reading import GaugeStatus, Mark, Reading, unread
 from fingervision.measuring.scale import Scale
 from fingervision.storage.gauges_csv import GaugeRow, GaugeRows, GaugesCsv
 from fingervision.vision.overlay import in_eight_bits

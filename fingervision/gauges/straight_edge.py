@@ -1,12 +1,23 @@
 """One straight edge as measured by gauges: its axes, its fitted parameters, and the limits for accepting it."""
 
-from dataclasses import dataclass
-from math import atan, cos, pi, sin
+from dataclasses import dataclass, replace
+from math import atan, ceil, cos, hypot, pi, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fingervision.gauges.reading import Mark
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.picture import Picture
+from fingervision.gauges.reading import GaugeStatus, Mark
+from fingervision.vision.edge_search import Profile, StepCandidate, candidates, profile
+from fingervision.vision.response_shift import u_edge_px
+from fingervision.vision.straight_edge_fit import (
+    Band,
+    EdgeStart,
+    NoEdgeFitError,
+    StraightEdges,
+    fit_straight_edges,
+    reach_px,
+)
 
 # Smallest contrast of an edge, as a share of full scale (as in `fingervision.vision.pipeline`).
 CONTRAST_FLOOR = 0.03
@@ -118,3 +129,283 @@ class Axes:
 def normal_of(axes: Axes, slope: float) -> float:
     """Direction (rad) perpendicular to an edge whose slope in the gauge's axes is `slope`."""
     return (axes.direction_rad - atan(slope) + pi) % (2.0 * pi) - pi
+
+
+# Fit the edges near the expected position of a gauge's edge, and give a reason if the result is refused.
+
+
+Floats = NDArray[np.float64]
+
+
+def fit_near(
+    follower: "EdgeFollower", picture: Picture, chosen: list[StepCandidate], steps: list[StepCandidate]
+) -> tuple[list[EdgeFound], float] | NotFound:
+    """Fit chosen edges together with all other edges within their fit windows.
+
+    Parameters
+    ----------
+    follower : EdgeFollower
+        Tracker of the edge, with its axes, its length and the results of earlier frames.
+    picture : Picture
+        The frame.
+    chosen : list of StepCandidate
+        One candidate, or the two of a pair; positions are relative to the tracker's `at_px`.
+    steps : list of StepCandidate
+        All candidates seen, including the chosen ones.
+
+    Returns
+    -------
+    (list of EdgeFound, float), or NotFound
+        The fitted edges in the order of `chosen`, and the covariance of the first two positions (0 for one edge).
+    """
+    blur = follower.known.blur_px if follower.known is not None else 1.2
+    reach = reach_px(blur)
+    least = LEAST_BESIDE * max(abs(step.contrast) for step in chosen)
+    beside = [
+        step
+        for step in steps
+        if step not in chosen
+        and abs(step.contrast) >= least
+        and min(abs(step.position_px - own.position_px) for own in chosen) < reach + 2.0
+    ]
+    beside = sorted(beside, key=lambda step: -abs(step.contrast))[:2]
+    starts = tuple(EdgeStart(step.position_px, follower.slope, step.contrast) for step in (*chosen, *beside))
+    x, y = follower.axes.point(follower.at_px)
+    band = Band(x, y, follower.axes.direction_rad, follower.length_px)
+    places = [start.position_px for start in starts]
+    half = hypot(0.5 * follower.length_px * hypot(1.0, follower.slope), max(map(abs, places)) + reach + 2.0)
+    corner = (int(x - half) - 1, int(y - half) - 1)
+    side = 2 * int(half) + 4
+    levels, origin = picture.part(*corner, side, side)
+    if not _is_in_view(picture, follower, min(places) - reach + 2.0, max(places) + reach - 2.0):
+        return NotFound(GaugeStatus.OUT_OF_VIEW)
+    if levels.size == 0:
+        return NotFound(GaugeStatus.OUT_OF_VIEW)
+    try:
+        cut_off = _cut_plateau(picture, levels)
+        fitted = fit_straight_edges(levels, origin, band, starts, blur, picture.edge_shared_pixels, cut_off)
+    except (NoEdgeFitError, np.linalg.LinAlgError) as why:
+        return NotFound(GaugeStatus.NO_EDGE, str(why))
+    found = []
+    for k, step in enumerate(chosen):
+        reason = _refused(follower, picture, fitted, k, step)
+        if reason is not None:
+            return reason
+        found.append(_edge(follower, picture, fitted, k))
+    if cut_off:
+        if fitted.lost - SURE * fitted.u_lost > MOST_LOST:
+            return NotFound(GaugeStatus.SATURATED, "the flank of the edge is clipped")
+        hidden = HIDDEN_SHIFT_SIGMAS * hypot(fitted.blur_px, 0.29)
+        found = [replace(one, u_position_px=hypot(one.u_position_px, hidden)) for one in found]
+    return found, float(fitted.covariance[0, 1]) if len(chosen) > 1 else 0.0
+
+
+def _is_in_view(picture: Picture, follower: "EdgeFollower", low_px: float, high_px: float) -> bool:
+    width, height = picture.size_px
+    half = 0.5 * follower.length_px
+    for t in (low_px, high_px):
+        for s in (-half, half):
+            x, y = follower.axes.point(follower.at_px + t + follower.slope * s, s)
+            if not (-0.5 <= x <= width - 0.5 and -0.5 <= y <= height - 0.5):
+                return False
+    return True
+
+
+def _refused(
+    follower: "EdgeFollower", picture: Picture, fitted: StraightEdges, k: int, step: StepCandidate
+) -> NotFound | None:
+    contrast = float(fitted.contrast[k])
+    known = follower.known
+    if contrast * step.contrast <= 0.0 or abs(contrast) < CONTRAST_FLOOR * picture.top:
+        return NotFound(GaugeStatus.NO_EDGE, "the edge has too little contrast")
+    if (
+        known is not None
+        and not LEAST_OF_KNOWN <= contrast / known.contrast <= MOST_OF_KNOWN
+        and len(fitted.contrast) < 2
+    ):
+        return NotFound(GaugeStatus.NO_EDGE, "the contrast differs too much from that in the previous frame")
+    if abs(float(fitted.position_px[k]) - step.position_px) > FARTHEST_FROM_CANDIDATE_PX + fitted.blur_px:
+        return NotFound(GaugeStatus.NO_EDGE, "the fit moved away from the edge")
+    if fitted.blur_px >= LARGEST_BLUR_PX:
+        return NotFound(GaugeStatus.BLURRED)
+    if fitted.noise > MOST_NOISE * abs(contrast):
+        return NotFound(GaugeStatus.NO_EDGE, "there is texture, but no edge")
+    if abs(float(fitted.slope[k])) > MOST_LEAN:
+        return NotFound(GaugeStatus.NO_EDGE, "the edge is tilted by more than 45 degrees against the gauge")
+    if k == 0 and fitted.least_piece < LEAST_PIECE:
+        return NotFound(GaugeStatus.NO_EDGE, "the edge ends within the gauge's length")
+    if k == 0 and fitted.bend_px > max(LARGEST_BEND_PX, LARGEST_BEND * follower.length_px):
+        return NotFound(GaugeStatus.NO_EDGE, f"the edge is bent by {fitted.bend_px:.1f} px: shorten length_px")
+    variance = float(fitted.covariance[k, k])
+    if not 0.0 < variance < LEAST_SURE_PX**2:
+        return NotFound(GaugeStatus.LOW_CONTRAST)
+    return None
+
+
+def _edge(follower: "EdgeFollower", picture: Picture, fitted: StraightEdges, k: int) -> EdgeFound:
+    count = fitted.position_px.size
+    covariance = fitted.covariance
+    contrast = float(fitted.contrast[k])
+    inside = fitted.inside + float(fitted.contrast[fitted.position_px < fitted.position_px[k] - 1e-9].sum())
+    shares = (inside / picture.top, (inside + contrast) / picture.top)
+    at = follower.at_px + float(fitted.position_px[k])
+    reach, half = reach_px(fitted.blur_px), 0.5 * follower.length_px
+    wide, high = abs(cos(follower.axes.direction_rad)), abs(sin(follower.axes.direction_rad))
+    carried = (wide * reach + high * half, high * reach + wide * half)
+    displaced = picture.displaced_px(follower.axes.point(at), carried, inside, contrast)
+    return EdgeFound(
+        at,
+        float(fitted.slope[k]),
+        hypot(float(np.sqrt(covariance[k, k])), displaced),
+        float(np.sqrt(covariance[count + k, count + k])),
+        float(covariance[k, count + k]),
+        contrast,
+        inside,
+        fitted.blur_px,
+        u_edge_px(picture.settings.camera.response, *shares, fitted.blur_px),
+    )
+
+
+def _cut_plateau(picture: Picture, levels: Floats) -> int:
+    """Whether much of one side of an edge is clipped and may be lighter (+1) or darker (-1) than recorded; 0 if not."""
+    middle = 0.5 * (float(levels.min()) + float(levels.max()))
+    light = levels > middle
+    if np.count_nonzero(levels >= picture.top) > MOST_CLIPPED * np.count_nonzero(light):
+        return 1
+    return -1 if np.count_nonzero(levels <= 0.0) > MOST_CLIPPED * np.count_nonzero(~light) else 0
+
+
+# Track one straight edge from frame to frame, taking account of other edges beside it.
+
+
+# Distance (pixels) below which two steps of a profile are the same edge; a profile of strips of one pixel determines
+# the position of a step to half a pixel.
+SAME_PX = 2.0
+
+
+class EdgeFollower:
+    """Finds one edge near its position in the previous frame.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes of the gauge.
+    at_px : float
+        Expected position of the edge on the axis t in the first frame.
+    length_px, reach_px : float
+        Settings of the gauge.
+    polarity : int
+        +1, -1 or 0 for any.
+    """
+
+    def __init__(self, axes: Axes, at_px: float, length_px: float, reach_px: float, polarity: int) -> None:
+        self.axes, self.length_px, self.reach_px = axes, length_px, reach_px
+        self.at_px, self.polarity = at_px, polarity
+        self.slope, self.times, self.most_times = 0.0, 1.0, float(MOST_TIMES)
+        self.first_reach_px = reach_px
+        self.known: EdgeFound | None = None
+
+    @property
+    def zone(self) -> Mark:
+        """The zone of the picture in which the edge is searched."""
+        return self.axes.box(self.at_px, self.reach_px * self.times, 0.5 * self.length_px)
+
+    def turned_to(self, axes: Axes, at_px: float, slope: float) -> None:
+        """Continue to follow an edge with other axes, in which the edge has the given position and slope."""
+        self.axes, self.at_px, self.slope = axes, at_px, slope
+
+    def lost(self) -> None:
+        """Widen the search zone of the next frame, because the edge was not found."""
+        self.times = min(self.times + 1.0, self.most_times) if self.known is not None else 1.0
+
+    def candidate(self, picture: Picture) -> tuple[StepCandidate, list[StepCandidate]] | NotFound:
+        """The only candidate that may be the edge, together with the other edges beside it."""
+        reach = self.first_reach_px if self.known is None else self.reach_px * self.times
+        guard = reach if self.known is None else GUARD * reach
+        half = ceil(guard) + BEYOND_PX
+        middle = self.axes.point(self.at_px)
+        anchor = (round(middle[0]), round(middle[1]))
+        width, height = picture.size_px
+        if not (0 <= anchor[0] < width and 0 <= anchor[1] < height):
+            return NotFound(GaugeStatus.OUT_OF_VIEW)
+        cosine, sine = cos(self.axes.direction_rad), sin(self.axes.direction_rad)
+        off_t = cosine * (anchor[0] - middle[0]) + sine * (anchor[1] - middle[1])
+        off_s = -sine * (anchor[0] - middle[0]) + cosine * (anchor[1] - middle[1])
+
+        def seen_at(lean: float) -> Profile:
+            return profile(picture.grey, picture.light, anchor, self.axes.direction_rad, lean, self.length_px, half)
+
+        if self.known is None:
+            profiles = [seen_at(lean) for lean in LEANS]
+            best = int(np.argmax([self._steepest(seen, reach) for seen in profiles]))
+            self.slope, seen = LEANS[best], profiles[best]
+        else:
+            seen = seen_at(self.slope)
+        off = off_t - self.slope * off_s
+        steps = [replace(step, position_px=step.position_px + off) for step in candidates(seen)]
+        if self.known is None:
+            strongest = max((abs(step.contrast) for step in self._in_reach(steps, reach)), default=0.0)
+            least, most = LEAST_OF_KNOWN * strongest, float("inf")
+        else:
+            least, most = (factor * abs(self.known.contrast) for factor in (LEAST_OF_KNOWN, MOST_OF_KNOWN))
+        least = max(least, CONTRAST_FLOOR * picture.top)
+        alike = [step for step in self._in_reach(steps, guard) if least <= abs(step.contrast) <= most]
+        if not alike:
+            if not steps and self.known is None:
+                return NotFound(GaugeStatus.LOW_CONTRAST)
+            return NotFound(GaugeStatus.NO_EDGE)
+        if len(alike) > 1:
+            places = ", ".join(f"{step.position_px:+.0f}" for step in alike)
+            return NotFound(
+                GaugeStatus.AMBIGUOUS, f"{len(alike)} edges lie within reach_px, at {places} px along the direction"
+            )
+        if abs(alike[0].position_px) > reach + 1.0:
+            return NotFound(GaugeStatus.NO_EDGE, "the edge found is farther away than reach_px")
+        if self.known is None:
+            wide = profile(
+                picture.grey, picture.light, anchor, self.axes.direction_rad, self.slope, self.length_px,
+                ceil(GUARD * MOST_TIMES * self.reach_px) + BEYOND_PX,
+            )  # fmt: skip
+            self.most_times = self._times_clear_of(
+                candidates(wide), replace(alike[0], position_px=alike[0].position_px - off)
+            )
+        return alike[0], steps
+
+    def _times_clear_of(self, steps: list[StepCandidate], own: StepCandidate) -> float:
+        """Multiple of `reach_px` up to which the search may be widened without including a similar edge."""
+        apart = [
+            abs(step.position_px - own.position_px)
+            for step in steps
+            if LEAST_OF_KNOWN <= step.contrast / own.contrast <= MOST_OF_KNOWN
+        ]
+        nearest = min((away for away in apart if away > SAME_PX), default=float("inf"))
+        return float(np.clip((nearest - SAME_PX) / (GUARD * self.reach_px), 1.0, MOST_TIMES))
+
+    def _in_reach(self, steps: list[StepCandidate], reach: float) -> list[StepCandidate]:
+        sign = self.polarity if self.known is None else (1 if self.known.contrast > 0.0 else -1)
+        return [s for s in steps if abs(s.position_px) <= reach and (sign == 0 or s.contrast * sign > 0.0)]
+
+    def _steepest(self, seen: Profile, reach: float) -> float:
+        """Largest step between neighbouring strips within reach, with the gauge's polarity."""
+        rise = np.where((seen.weight[1:] > 0.5) & (seen.weight[:-1] > 0.5), np.diff(seen.level), 0.0)
+        rise = self.polarity * rise if self.polarity else np.abs(rise)
+        near = np.abs(np.arange(rise.size) + 0.5 - seen.half) <= reach + 1.0
+        return float(np.max(rise[near], initial=0.0))
+
+    def measured(self, picture: Picture) -> EdgeFound | NotFound:
+        """Find and fit the edge in the next frame."""
+        chosen = self.candidate(picture)
+        if isinstance(chosen, NotFound):
+            self.lost()
+            return chosen
+        found = fit_near(self, picture, [chosen[0]], chosen[1])
+        if isinstance(found, NotFound):
+            self.lost()
+            return found
+        (one,), _ = found
+        self.keep(one)
+        return one
+
+    def keep(self, found: EdgeFound) -> None:
+        """Store the position of the edge for the next frame."""
+        self.known, self.at_px, self.slope, self.times = found, found.position_px, found.slope, 1.0

@@ -6,8 +6,7 @@ from typing import Any
 from calib.board import Board
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError
 from fingervision.frames.array_levels import what_it_is
-from fingervision.interface.argument_checks import number, one_of, region_of
-from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.argument_checks import number, one_of, region_of, speaks_python
 from fingervision.interface.calibration import Calibration
 from fingervision.interface.calibration_fits import Noted, on_board, on_lines, on_sizes
 from fingervision.interface.reference_pictures import references_of

@@ -11,14 +11,164 @@ import numpy as np
 from calib.gauge_study import Agreement
 from calib.known_widths import KnownSize, find_widths
 from calib.measured_scale import Calibration as MeasuredScale
-from fingervision.interface.argument_checks import path_of, region_of
-from fingervision.interface.argument_names import speaks_python
-from fingervision.interface.calibration_report import budget_lines, scale_lines
-from fingervision.interface.picture_response import PictureResponse
+from fingervision.interface.argument_checks import path_of, region_of, speaks_python
+from fingervision.interface.reference_pictures import PictureResponse
 from fingervision.storage.calibration_json import read_calibration, refuse_foreign, write_calibration, write_picture
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from calib.line_scale import ScaleLines
+    from calib.parallel_edges import ParallelEdges
+    from calib.scale_from_board import BoardFit
+    from calib.scale_from_lines import LineScaleFit
+    from calib.scale_from_sizes import ScaleFit
+
+
+# The report of a calibration, in lines of text.
+
+
+# The budget is printed for a gap of this size in the middle of the picture, measured over 20 rows.
+TABLE_GAP_MM, TABLE_U_PX = 1.0, 0.0106
+
+
+def scale_lines(calibration: MeasuredScale) -> list[str]:
+    """Lines with scale and edge bias and their expanded uncertainties."""
+    scale, u = calibration.px_per_mm, calibration.u_px_per_mm
+    return [
+        f"scale      {scale:.5f} px/mm   U = {2 * u:.5f} px/mm (k = 2), {200 * u / scale:.4f} %",
+        f"edge bias  {calibration.edge_bias_px:+.4f} px       U = {2 * calibration.u_edge_bias_px:.4f} px (k = 2)",
+    ]
+
+
+def budget_lines(calibration: MeasuredScale) -> list[str]:
+    """Lines of the uncertainty budget of a gap, the largest contribution first."""
+    width, height = calibration.frame_size_px
+    half = TABLE_GAP_MM * calibration.px_per_mm / 2.0
+    x, y = (width - 1) / 2.0, (height - 1) / 2.0
+    points = np.array([[[x - half, y], [x + half, y]]])
+    table = calibration.budget(points, np.array([TABLE_U_PX]), np.array([True])).table()
+    return [
+        "",
+        f"Budget of a light gap of {TABLE_GAP_MM:g} mm in the middle of the picture (standard uncertainties):",
+        *table.splitlines(),
+        "Not included: motion blur, a change of focus, aperture or exposure since the calibration, edges that are not",
+        "the gripper's outline (dirt, burrs, reflections). Limits marked default were not stated: see --help.",
+    ]
+
+
+def sizes_lines(fit: "ScaleFit", edges: Sequence["ParallelEdges"]) -> list[str]:
+    """Lines with every reference's size and its residual from the fitted straight line."""
+    lines = [
+        "",
+        "reference            size, mm   width, px    u, px    rows used            taper, px/row       residual, um",
+    ]
+    for reference, edge, residual in zip(fit.calibration.references, edges, fit.residual_mm, strict=True):
+        rows = f"{edge.profiles} {edge.first}-{edge.last} ({edge.count})"
+        taper = f"{edge.taper:+.5f}+-{edge.u_taper:.5f}"
+        lines.append(
+            f"{reference.what:<20} {reference.size_mm:8.4f} {edge.width_px:11.4f} {edge.u_width_px:8.4f}    {rows:<20} "
+            f"{taper:<19} {1e3 * residual:+8.3f}"
+        )
+    if not fit.bias_known:
+        lines.append(
+            "The sizes do not determine the edge bias, which is therefore taken as 0; its limit is included in the "
+            "budget. Three sizes, or a bar and a slot, determine the edge bias."
+        )
+    elif fit.freedom == 0:
+        lines.append("With two sizes the straight line cannot be checked; a third size checks it.")
+    else:
+        lines.append(
+            f"Linearity: largest residual {1e3 * float(np.max(np.abs(fit.residual_mm))):.3f} um; chi square "
+            f"{fit.chi_square:.2f} with {fit.freedom} degrees of freedom (chance {100 * fit.probability:.1f} %)."
+        )
+    if any(part.source.startswith("misfit") for part in fit.calibration.parts):
+        lines.append(
+            "The sizes do not lie on a straight line within their uncertainties, which were enlarged to match. "
+            "Check the certificates, remove dirt, and make sure that nothing moved."
+        )
+    for reference, edge in zip(fit.calibration.references, edges, strict=True):
+        if abs(edge.taper) > 3.0 * edge.u_taper and abs(edge.taper) * edge.count > 0.05:
+            lines.append(
+                f"{reference.what} tapers by {edge.taper:+.4f} px per {edge.profiles[:-1]}: its width depends on the "
+                f"{edge.profiles} used; choose with --roi those for which the certificate is valid."
+            )
+    return lines
+
+
+def board_lines(fit: "BoardFit") -> list[str]:
+    """Lines about the lens, the plane, and how straight the board's rows are."""
+    lines = [""]
+    if fit.lens is None:
+        lines.append("lens       not calibrated: one picture determines only the plane")
+    else:
+        names = ("f_x px", "f_y px", "c_x px", "c_y px", "k1", "k2", "p1", "p2", "k3")
+        values = zip(names, fit.lens.lens.parameters, fit.lens.u_parameters, strict=True)
+        lines.append("lens       " + ", ".join(f"{name} {value:.5g}+-{u:.1g}" for name, value, u in values))
+        lines.append(f"corners    {fit.lens.rms_px:.4f} px RMS over all pictures (reprojection)")
+    lines.append(f"plane      {fit.calibration.references[0].what}: tilted by {fit.plane.tilt_deg:.2f} degrees")
+    lines.append(f"straight   rows and columns of corners to {fit.straightness_px:.4f} px RMS after correction")
+    lines.append(
+        "The calibration is valid in the plane of the first picture: in that picture, the board must lie where the "
+        "gripper moves."
+    )
+    return lines
+
+
+def as_json(calibration: MeasuredScale, more: dict[str, Any]) -> dict[str, Any]:
+    """Summary of a calibration as a dictionary, for programs."""
+    return {
+        "px_per_mm": calibration.px_per_mm,
+        "u_px_per_mm": calibration.u_px_per_mm,
+        "edge_bias_px": calibration.edge_bias_px,
+        "u_edge_bias_px": calibration.u_edge_bias_px,
+    } | more
+
+
+def line_details(fit: "LineScaleFit", lines: "ScaleLines") -> dict[str, object]:
+    """Results for a line scale as a dictionary, for programs."""
+    return {
+        "bias_known": False,
+        "lines": len(lines.at_px),
+        "lines_used": int(fit.used.sum()),
+        "dark": lines.is_dark,
+        "line_width_mm": fit.width_mm,
+        "u_line_width_mm": fit.u_width_mm,
+        "px_per_mm_by_rising_edges": fit.by_edge[0],
+        "px_per_mm_by_falling_edges": fit.by_edge[1],
+        "largest_residual_um": float(abs(fit.residual_um[fit.used]).max()),
+        "chi_square": fit.chi_square,
+        "freedom": fit.freedom,
+    }
+
+
+def line_lines(fit: "LineScaleFit", lines: "ScaleLines") -> list[str]:
+    """Lines of text about the lines of a line scale, their edges and their residuals."""
+    rising, falling = fit.by_edge
+    scale = fit.calibration.px_per_mm
+    tone = "dark" if lines.is_dark else "light"
+    text = [
+        "",
+        f"lines      {int(fit.used.sum())} of {len(lines.at_px)} {tone} lines used, over "
+        f"{fit.calibration.references[0].size_mm:g} mm; edges spread over {lines.blur_px:.2f} px (sigma)",
+        f"edges      scale by rising edges alone {100 * (rising / scale - 1):+.4f} %, by falling edges alone "
+        f"{100 * (falling / scale - 1):+.4f} %, relative to that by the middles of the lines",
+        f"residuals  {float(abs(fit.residual_um[fit.used]).max()):.3f} um at most; chi square {fit.chi_square:.1f} "
+        f"with {fit.freedom} degrees of freedom (chance {100 * fit.probability:.1f} %)",
+    ]
+    if fit.width_mm is not None:
+        text.insert(
+            3, f"width      {1e3 * fit.width_mm:.2f} um, the apparent width of the lines (not corrected for edge bias)"
+        )
+    else:
+        text.insert(3, "width      not determined: the lines are narrower than twice their blur")
+    if fit.probability < 0.01:
+        text.append(
+            "The distances of the lines are not equal within their uncertainties, which were enlarged to match."
+        )
+    if lines.is_clipped:
+        text.append("Part of the picture is clipped at an end of the grey scale: the widths of the lines may be wrong.")
+    return text
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -196,4 +346,4 @@ class Calibration:
         return f"<pre>{escape(self.report())}</pre>{'' if first is None else image_html(png_of(first))}"
 
 
-__all__ = ["Calibration"]
+__all__ = ["Calibration", "as_json"]

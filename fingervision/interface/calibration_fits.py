@@ -8,6 +8,7 @@ from typing import Any
 from calib.board import Board, find_corners
 from calib.calibration_picture import picture_of_corners, picture_of_edges, picture_of_lines
 from calib.known_widths import find_widths
+from calib.limits import Limits
 from calib.line_scale import find_lines
 from calib.measured_scale import Calibration as MeasuredScale
 from calib.measured_scale import Reference as Certified
@@ -15,11 +16,31 @@ from calib.scale_from_board import scale_from_board
 from calib.scale_from_lines import scale_from_lines
 from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
 from fingervision import __version__
-from fingervision.interface import calibration_report as report
-from fingervision.interface.bench_limits import limits_from
-from fingervision.interface.calibration import Calibration
-from fingervision.interface.picture_response import PictureResponse
-from fingervision.interface.reference_pictures import Reference, files_of, known_sizes, read_pictures
+from fingervision.interface.calibration import Calibration, board_lines, line_details, line_lines, sizes_lines
+from fingervision.interface.reference_pictures import PictureResponse, Reference, files_of, known_sizes, read_pictures
+
+# Limits of the set-up that enter the uncertainty (plane, tilt, temperature), with defaults for those not stated.
+
+
+# Residual distortion of a calibrated lens, relative to the radius at the corner (as the rows and columns of a board
+# show).
+LENS_LEFT = 0.0002
+
+
+def limits_from(stated: Mapping[str, float | None], *, lens_calibrated: bool) -> tuple[Limits, frozenset[str]]:
+    """Return the limits of the set-up, and the names of those that the user stated.
+
+    Parameters
+    ----------
+    stated : mapping of str to float or None
+        Limits by their names in `calib.Limits`; None for a limit that is not stated.
+    lens_calibrated : bool
+        Whether the distortion of the lens is corrected, so that the residual distortion is smaller.
+    """
+    given = {name: value for name, value in stated.items() if value is not None}
+    defaults = {"lens_relative": LENS_LEFT} if lens_calibrated else {}
+    return Limits(**(defaults | given)), frozenset(given)
+
 
 Region = tuple[int, int, int, int]
 Stated = Mapping[str, float | None]
@@ -93,7 +114,7 @@ def on_sizes(
         for picture, edge in zip(stored, edges, strict=True)
     }
     scale = _complete(read_with.noted(fit.calibration, shift_px), noted.camera)
-    return Calibration(scale, None, tuple(report.sizes_lines(fit, edges)), drawn, details)
+    return Calibration(scale, None, tuple(sizes_lines(fit, edges)), drawn, details)
 
 
 def on_board(
@@ -126,7 +147,7 @@ def on_board(
         "straightness_px": fit.straightness_px,
         "tilt_deg": fit.plane.tilt_deg,
     }
-    return Calibration(scale, None, tuple(report.board_lines(fit)), drawn, details)
+    return Calibration(scale, None, tuple(board_lines(fit)), drawn, details)
 
 
 def on_lines(
@@ -150,7 +171,7 @@ def on_lines(
     scale = _complete(read_with.noted(fit.calibration, 0.0), noted.camera)
     words = f"{name}: {len(lines.at_px)} lines, pitch {pitch_mm:g} mm"
     drawn = {name: picture_of_lines(stored, lines, fit.used, fit.residual_um, words)}
-    return Calibration(scale, None, tuple(report.line_lines(fit, lines)), drawn, report.line_details(fit, lines))
+    return Calibration(scale, None, tuple(line_lines(fit, lines)), drawn, line_details(fit, lines))
 
 
 def _complete(scale: MeasuredScale, camera: Mapping[str, str]) -> MeasuredScale:
@@ -159,4 +180,4 @@ def _complete(scale: MeasuredScale, camera: Mapping[str, str]) -> MeasuredScale:
     return replace(scale, camera=dict(camera), made_at=made_at, software=f"fingervision {__version__}")
 
 
-__all__ = ["Noted", "on_board", "on_lines", "on_sizes"]
+__all__ = ["LENS_LEFT", "Noted", "limits_from", "on_board", "on_lines", "on_sizes"]

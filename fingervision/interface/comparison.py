@@ -12,9 +12,8 @@ from fingervision.diagnosis.compare import Comparison as OneComparison
 from fingervision.diagnosis.compare import compare as compare_one
 from fingervision.diagnosis.report.comparison_files import comparison_document, residuals_of, write_comparison
 from fingervision.domain.report import Place
-from fingervision.interface.argument_checks import whole_number
-from fingervision.interface.argument_names import speaks_python
-from fingervision.interface.saved_results import cell_html, save_results
+from fingervision.interface.argument_checks import speaks_python, whole_number
+from fingervision.interface.notebook import cell_html, save_results
 from fingervision.interface.tables import measured_given, models_given
 from fingervision.storage.out_folder import mark_owner, out_folder
 from fingervision.storage.provenance import Provenance, provenance

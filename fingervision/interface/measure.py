@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from calib.calibration import BareScale
 from fingervision.frames.source import FrameSource, Wish, open_source
-from fingervision.interface.argument_checks import region_of
-from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.argument_checks import region_of, speaks_python
 from fingervision.interface.frame_sources import recording_of
 from fingervision.interface.measurement import Measurement
 from fingervision.interface.measuring_task import measuring_task, range_of, scale_of

@@ -13,8 +13,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import UsageError
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.measured_table import MeasuredTable
-from fingervision.interface.argument_checks import path_of, whole_number
-from fingervision.interface.argument_names import in_python, python_words, speaks_python
+from fingervision.interface.argument_checks import in_python, path_of, python_words, speaks_python, whole_number
 from fingervision.interface.frame_sources import Opener
 from fingervision.measuring.in_memory import MeasuredInMemory
 from fingervision.measuring.words import in_one_line, result_sentences
@@ -292,7 +291,7 @@ class Measurement:
         OutputError
             The file or folder cannot be written.
         """
-        from fingervision.measuring.save import save_measured
+        from fingervision.measuring.output_folder import save_measured
 
         out = path_of("folder", folder, "a folder")
         steps_frame = None if steps is None else whole_number("steps", steps, 0)

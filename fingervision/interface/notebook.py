@@ -1,14 +1,22 @@
 """Pictures for a notebook cell, embedded in the page so that the notebook can be sent to others."""
 
 from base64 import b64encode
+from html import escape
 from io import BytesIO
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.interface.argument_checks import path_of, speaks_python
+from fingervision.storage.out_folder import own_folder
+
 if TYPE_CHECKING:
+    import os
+
     from matplotlib.figure import Figure
+
 
 DOTS_PER_INCH = 80
 """Resolution of a figure in a notebook cell: 720 pixels for 9 inches, about the width of a notebook's column."""
@@ -33,4 +41,42 @@ def image_html(png: bytes) -> str:
     return f'<img style="max-width:100%" alt="" src="data:image/png;base64,{b64encode(png).decode()}">'
 
 
-__all__ = ["image_html", "png_of", "png_of_figure"]
+# Base of results that are saved as the command of the same name saves them, and shown in a notebook cell.
+
+
+class Results(Protocol):
+    """Results from one measured table."""
+
+    @property
+    def measured(self) -> Path:
+        """Path of the measured table, or a name for a table in memory."""
+
+    def figure(self) -> "Figure":
+        """Draw the residuals."""
+
+    def write(self, out: Path) -> object:
+        """Write the result's files into an existing folder."""
+
+
+@speaks_python
+def save_results(results: Results, folder: "str | os.PathLike[str]") -> Path:
+    """Write the files into a folder, unless it holds the results of another table; return the folder.
+
+    Raises
+    ------
+    UsageError
+        The folder holds the results of another table.
+    OutputError
+        The file or folder cannot be written.
+    """
+    out = own_folder(path_of("folder", folder, "a folder"), results.measured, named=True)
+    results.write(out)
+    return out
+
+
+def cell_html(results: Results, words: str) -> str:
+    """Return the HTML of a notebook cell: a text and the figure of the residuals."""
+    return f"<pre>{escape(words)}</pre>{image_html(png_of_figure(results.figure()))}"
+
+
+__all__ = ["Results", "cell_html", "image_html", "png_of", "png_of_figure", "save_results"]

@@ -9,8 +9,7 @@ from fingervision.domain.effect import DriveEffect, Effect, PointEffect, Stage
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError
 from fingervision.domain.parameter import Parameter
 from fingervision.effects import catalogue, register, withdraw
-from fingervision.interface.argument_checks import one_of
-from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.argument_checks import one_of, speaks_python
 from fingervision.plugins.watched_import import importing
 
 ARGUMENTS = 3

@@ -22,8 +22,7 @@ from fingervision.domain.errors import (
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
 from fingervision.frames.array_levels import what_it_is
-from fingervision.interface.argument_checks import path_of
-from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.argument_checks import path_of, speaks_python
 from fingervision.interface.notebook import image_html, png_of_figure
 from fingervision.interface.tables import model_given
 from fingervision.models.function_model import FunctionModel

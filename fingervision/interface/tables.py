@@ -13,8 +13,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ArgumentTypeError, FingervisionError, OutputError, UnknownNameError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.frames.array_levels import what_it_is
-from fingervision.interface.argument_checks import one_of, path_of
-from fingervision.interface.argument_names import speaks_python
+from fingervision.interface.argument_checks import one_of, path_of, speaks_python
 from fingervision.interface.column_tables import columns_of, measured_from_columns, simulation_from_columns
 from fingervision.interface.measurement import Measurement
 from fingervision.models.corrected import CorrectedModel

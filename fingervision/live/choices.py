@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from calib.measured_scale import Calibration
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import UsageError
 from fingervision.domain.region import Region
@@ -131,3 +132,18 @@ class Choices:
         if gap_mm + guard_mm < low or gap_mm - guard_mm > high:
             return "fail"
         return "pass" if low <= gap_mm - guard_mm and gap_mm + guard_mm <= high else "unsure"
+
+    def state(self) -> dict[str, Any]:
+        """Return scale, region, height, zero and tolerance, for the browser page."""
+        scale, region = self.scale, self.region
+        return {
+            "zero_mm": self.zero_mm,
+            "px_per_mm": None if scale is None else scale.px_per_mm,
+            "u_px_per_mm": scale.u_px_per_mm if isinstance(scale, Calibration) else None,
+            "region": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
+            "tips": "auto" if self.direction is None else self.direction.value,
+            "fingers": {None: "auto", True: "dark", False: "light"}[self.fingers_are_dark],
+            "below_tip_mm": self.below_tip_mm,
+            "least_mm": self.least_mm,
+            "greatest_mm": self.greatest_mm,
+        }

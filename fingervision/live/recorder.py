@@ -3,12 +3,36 @@
 import shutil
 from pathlib import Path
 from queue import Empty, Full, Queue
-from time import monotonic
+from time import monotonic, process_time, thread_time
 
 from fingervision.domain.errors import OutputError
-from fingervision.live.processor_use import of_process_s, of_this_thread_s
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.live.supervisor import Supervisor, told
+
+# Processor time of a thread and of the process: used, or waited for while other threads and programs had it.
+
+
+# Of each thread: nanoseconds on a processor, nanoseconds ready to run without one (Linux, Documentation/scheduler/
+# sched-stats.rst).
+TASKS, SCHEDULED = Path("/proc/self/task"), Path("/proc/thread-self/schedstat")
+
+
+def of_this_thread_s() -> float:
+    """Processor time (s) that the calling thread has used or waited for; the waits are known on Linux only."""
+    return thread_time() + _waited_s(SCHEDULED)
+
+
+def of_process_s() -> float:
+    """Processor time (s) that all threads of this process have used or waited for."""
+    return process_time() + sum(map(_waited_s, TASKS.glob("*/schedstat")))
+
+
+def _waited_s(file: Path) -> float:
+    try:
+        return 1e-9 * int(file.read_text().split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0.0
+
 
 # Time for which the disk space suffices for a recording at its present data rate (minutes).
 

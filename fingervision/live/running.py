@@ -21,7 +21,6 @@ from fingervision.live.beside import Beside, stand_beside
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
 from fingervision.live.comparison.comparison import Comparison
-from fingervision.live.messages import Message
 from fingervision.live.playback.gauges_beside import put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import Recorded
@@ -29,6 +28,7 @@ from fingervision.live.run_folder import remove_leftovers
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.live.supervisor import Supervisor
+from fingervision.live.view import Message
 from fingervision.storage.gaps_csv import GapRow
 
 # Print in a separate thread, so that a slow or missing reader delays neither measurement nor recording.

@@ -22,8 +22,7 @@ from starlette.websockets import WebSocket
 from fingervision.domain.errors import FingervisionError, ProcessError, UsageError
 from fingervision.live.access import Access
 from fingervision.live.commands import modules
-from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard
-from fingervision.live.half_open import PatientProtocol
+from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard, PatientProtocol
 from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
 from fingervision.live.pen import Pen
 from fingervision.live.picture_watch import PictureWatch

@@ -16,17 +16,15 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.received import Driven
 from fingervision.live.cadence import Cadence
-from fingervision.live.capture import Arrival, Capture, Ended, Happening
+from fingervision.live.capture import Arrival, Capture, Ended, Happening, OverflowReport
 from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF, Choices
 from fingervision.live.frame_measurement import FrameMeasurement, Seen
-from fingervision.live.messages import Message, MessageListener, Messages
-from fingervision.live.overflow_report import OverflowReport
 from fingervision.live.recorder import Recorder
 from fingervision.live.run_folder import RecordedFrame, RunFolder
-from fingervision.live.session_state import state_of_session
 from fingervision.live.supervisor import Supervisor
-from fingervision.measuring.other_camera import other_camera
+from fingervision.live.view import Message, MessageListener, Messages
 from fingervision.measuring.rehearsal import rehearse
+from fingervision.measuring.scale import other_camera
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.grey import full_scale, to_grey
 
@@ -225,7 +223,33 @@ class Session:
 
     def state(self) -> dict[str, Any]:
         """Return the state of source and measurement, for the browser page."""
-        return state_of_session(self)
+        cadence, recorder, description = self.cadence, self.recording, self.description
+        jitter_s = cadence.jitter_s
+        return {
+            "source": description.name,
+            "kind": description.kind,
+            "whole": False,
+            "width_px": description.width_px,
+            "height_px": description.height_px,
+            "rate_hz": cadence.rate_hz,
+            "camera": ", ".join(f"{name} {value}" for name, value in self.capture.source.description.camera.items()),
+            "jitter_ms": None if jitter_s is None else 1e3 * jitter_s,
+            "dropped": cadence.missing + self.capture.overflowed,
+            "duplicates": self.counts[Status.DUPLICATE],
+            "damaged": self.counts[Status.DAMAGED],
+            "exposure": self.exposure.words,
+            "silent_s": self.silent_s,
+            "ended": self.ended.is_set(),
+            "trouble": self.supervisor.trouble,
+            "recording": None
+            if recorder is None
+            else {
+                "path": str(recorder.run.path),
+                "frames": recorder.run.frames,
+                "minutes_left": recorder.minutes_left,
+            },
+            **self.choices.state(),
+        }
 
     @property
     def messages(self) -> deque[Message]:

@@ -45,9 +45,11 @@ def learnt_first(
     frames : iterator of Frame or LostFrame
         All frames in order; an exception of the source is raised after the frames that came before it.
     camera : CameraModel
-        The learnt camera, with the response that is known; the camera before if too few frames have a gap.
+        The learnt camera; the camera before if its response is known or too few frames have a gap.
     """
     source = iter(frames)
+    if settings.camera.response.is_known:
+        return source, settings.camera
     kept: list[Frame | LostFrame] = []
     seen: list[Frame] = []
     failed: list[Exception] = []
@@ -86,7 +88,7 @@ def camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) 
     before = settings.camera
     if len(seen) < FEWEST:
         return before
-    camera = before if before.response.is_known else learnt_camera(seen, before, top, coding)
+    camera = learnt_camera(seen, before, top, coding)
     if coding is not Coding.INTERFRAME:  # such a codec repeats the noise of the picture before
         lag = temporal_lag([(number, *each) for number, each in zip(numbers, seen, strict=True)])
         camera = replace(camera, lag=lag)

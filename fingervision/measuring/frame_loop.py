@@ -20,12 +20,12 @@ from fingervision.measuring.camera_learning import learnt_first
 from fingervision.measuring.frame_sequence import Judged, in_sequence
 from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.marked import marked
-from fingervision.measuring.other_camera import other_camera
 from fingervision.measuring.rows import Result, RowMaker
+from fingervision.measuring.scale import other_camera
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.task import Task
-from fingervision.measuring.temporal_filter import Lagging
+from fingervision.measuring.temporal_filter import with_lag
 from fingervision.storage.beside import recorded_camera
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.lost_frames import lost_frames
@@ -263,7 +263,7 @@ def _outcomes(
     is_stopped: Callable[[], bool],
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Yield every frame with its result; the decoder runs ahead, and stops when this generator is closed."""
-    pictures, lagging = SoundPictures(), Lagging()
+    pictures = SoundPictures()
 
     def judged(frames: Iterable[Frame | LostFrame]) -> Iterator[Judged]:
         settings = replace(how.settings, camera=series.camera)
@@ -277,8 +277,7 @@ def _outcomes(
         first, series.camera = learnt_first(
             coded(frames, how.description.coding), how.settings, how.row_maker.scale, is_stopped
         )
-        for item, outcome in in_sequence(judged(first)):
-            yield item, lagging.added(item.index, outcome, series.camera.lag)
+        yield from with_lag(in_sequence(judged(first)), series.camera.lag)
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:

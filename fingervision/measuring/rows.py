@@ -8,8 +8,7 @@ import numpy as np
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.measuring.bias_share import bias_shares
-from fingervision.measuring.gap_budget import gap_budget
+from fingervision.measuring.gap_budget import bias_shares, gap_budget
 from fingervision.measuring.scale import Scale
 from fingervision.motion.drive_at import drive_at
 from fingervision.storage.gaps_csv import GapRow

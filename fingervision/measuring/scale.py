@@ -1,12 +1,14 @@
 """The scale that a measurement uses: a bare number of pixels per millimetre, or a calibration."""
 
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.calibration import BareScale, StatedScale
-from calib.measured_scale import Distances
+from calib.errors import CalibrationError
+from calib.measured_scale import Calibration, Distances
 from fingervision.domain.errors import DataError, UsageError
 
 # Permitted scales, from a picture of a street to a picture through a microscope; other values are typing errors, and
@@ -129,3 +131,29 @@ def scale_for_frames(scale: Scale, frame_size_px: tuple[int, int]) -> Scale:
     except ValueError as error:
         raise DataError(str(error)) from error
     return scale.for_frames(frame_size_px) if isinstance(scale, StatedScale) else scale
+
+
+# Check that the camera has the same settings as at its calibration.
+
+
+def other_camera(scale: Scale | None, camera: Mapping[str, str]) -> str:
+    """Sentence that names the camera settings that differ from those of the calibration.
+
+    Parameters
+    ----------
+    scale : Scale or None
+        Scale of the measurement; a bare scale contains no camera settings.
+    camera : mapping of str to str
+        Camera settings of the recording, as far as known.
+
+    Returns
+    -------
+    str
+        A sentence; empty if no setting known for both differs.
+    """
+    if isinstance(scale, Calibration):
+        try:
+            scale.check_camera(camera)
+        except CalibrationError as error:
+            return str(error)
+    return ""

@@ -13,7 +13,7 @@ from fingervision.domain.errors import UsageError
 from fingervision.domain.region import Region
 from fingervision.frames.source import Description
 from fingervision.gauges.gauge_file import Gauge, check_gauges
-from fingervision.measuring.response_budget import choose_response
+from fingervision.measuring.gap_budget import choose_response
 from fingervision.measuring.scale import Scale, scale_for_frames
 from fingervision.vision.pipeline import Settings
 

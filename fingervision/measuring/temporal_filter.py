@@ -8,7 +8,7 @@ its fixed pattern. A filter may be weaker where something moves, so that the lag
 between (a rectangular distribution).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from math import hypot, sqrt
 
@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.camera import CameraQuantity, Origin
-from fingervision.domain.frame import LostFrame
+from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.profile_lines import INNER
 
 Floats = NDArray[np.float64]
-Outcome = GapMeasurement | NoGap | LostFrame
+Item = tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]
 
 # Sigma (pixels) of the blur that is subtracted from each difference: shadows that move on the ground, and flicker, are
 # smooth. Least number of still pixels, and of differences of successive pictures.
@@ -93,30 +93,22 @@ def _ground(edges: Sequence[EdgePoints]) -> tuple[slice, slice] | None:
     return slice(int(np.ceil(top)), int(bottom) + 1), slice(int(np.ceil(left)), int(right) + 1)
 
 
-class Lagging:
-    """Adds to each gap's uncertainty the way that the gap may have gone on during the lag of the camera's filter."""
+def with_lag(items: Iterable[Item], lag: CameraQuantity) -> Iterator[Item]:
+    """Add to each gap's uncertainty the way that it may have gone on during the lag of the camera's filter.
 
-    def __init__(self) -> None:
-        self._before: tuple[int, float] | None = None
-
-    def added(self, index: int, outcome: Outcome, lag: CameraQuantity) -> Outcome:
-        """Result of the next frame, with the uncertainty that the lag means.
-
-        Parameters
-        ----------
-        index : int
-            Number of the frame, larger than that of the frame before.
-        outcome : GapMeasurement, NoGap or LostFrame
-            Result of the frame.
-        lag : CameraQuantity
-            Result of `temporal_lag`.
-        """
-        if not isinstance(outcome, GapMeasurement):
-            return outcome
-        before, gap_px = self._before or (index - 1, outcome.gap_px)
-        self._before = index, outcome.gap_px
-        u_px = abs(lag.value * (outcome.gap_px - gap_px)) / max(index - before, 1) / sqrt(3.0)
-        if u_px == 0.0:
-            return outcome
-        beside = outcome.beside or ("trail" if u_px > outcome.u_gap_px else "")
-        return replace(outcome, u_shift_px=hypot(outcome.u_shift_px, u_px), beside=beside)
+    Parameters
+    ----------
+    items : iterable of (Frame or LostFrame, GapMeasurement or NoGap or LostFrame)
+        Frames in order, with their results.
+    lag : CameraQuantity
+        Result of `temporal_lag`.
+    """
+    before: tuple[int, float] | None = None
+    for item, outcome in items:
+        if lag.value > 0.0 and isinstance(outcome, GapMeasurement):
+            index, gap_px = before or (item.index - 1, outcome.gap_px)
+            u_px = abs(lag.value * (outcome.gap_px - gap_px)) / (item.index - index) / sqrt(3.0)
+            before = item.index, outcome.gap_px
+            beside = "trail" if u_px > outcome.u_gap_px else ""
+            outcome = replace(outcome, u_shift_px=hypot(outcome.u_shift_px, u_px), beside=outcome.beside or beside)
+        yield item, outcome

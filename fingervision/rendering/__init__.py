@@ -6,12 +6,11 @@ separately; the compression modules need OpenCV and PyAV.
 """
 
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera
-from fingervision.rendering.dust import dust
 from fingervision.rendering.finger import EllipticTip, Finger, Highlight, SquareTip
 from fingervision.rendering.lens import RadialLens, Tilt
 from fingervision.rendering.light import EVEN_LIGHT, Light, LightStep
 from fingervision.rendering.picture import exact_grey, render
-from fingervision.rendering.scene import Patch, Rim, Scene
+from fingervision.rendering.scene import Patch, Rim, Scene, dust
 from fingervision.rendering.truth import TrueEdge, TrueGap, truth
 from fingervision.rendering.two_fingers import two_fingers
 

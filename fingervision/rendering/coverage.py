@@ -20,9 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from fingervision.domain.region import Region
-from fingervision.rendering.line import Line
-from fingervision.rendering.outline import Outline
-from fingervision.rendering.plane import Points
+from fingervision.rendering.outline import Line, Outline, Points
 
 # Number of nodes of a panel, and its length in sigma; the error is 1e-7 of full coverage
 # (tests/rendering/test_coverage.py).

@@ -7,10 +7,7 @@ import numpy as np
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import DataError
-from fingervision.rendering.biarc import biarcs
-from fingervision.rendering.line import Line
-from fingervision.rendering.outline import Outline, Piece
-from fingervision.rendering.plane import Motion
+from fingervision.rendering.outline import Line, Motion, Outline, Piece, biarcs
 from fingervision.rendering.polygon import polygon
 
 # A half ellipse is approximated by this number of circular arcs, with an error of 1e-4 px; the true gap is computed

@@ -10,10 +10,7 @@ from math import cos, hypot, radians, sin
 import numpy as np
 
 from fingervision.domain.errors import DataError
-from fingervision.rendering.biarc import biarcs
-from fingervision.rendering.line import Line
-from fingervision.rendering.outline import Outline, Piece
-from fingervision.rendering.plane import Points
+from fingervision.rendering.outline import Line, Outline, Piece, Points, biarcs
 
 # The distorted radius must increase with the radius up to this multiple of the frame's half diagonal; beyond it the
 # distortion factor is constant.

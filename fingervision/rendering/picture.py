@@ -7,8 +7,8 @@ from fingervision.domain.frame import Pixels
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.coverage import coverage, window_of
 from fingervision.rendering.outline import Outline
+from fingervision.rendering.polygon import union
 from fingervision.rendering.scene import Scene
-from fingervision.rendering.union import union
 
 
 def render(scene: Scene, camera: Camera, rng: np.random.Generator) -> Pixels:

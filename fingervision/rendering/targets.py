@@ -3,8 +3,7 @@
 from math import radians
 
 from fingervision.domain.errors import DataError
-from fingervision.rendering.outline import Outline, disc
-from fingervision.rendering.plane import Motion
+from fingervision.rendering.outline import Motion, Outline, disc
 from fingervision.rendering.polygon import polygon
 
 __all__ = ["bar", "chessboard", "disc", "needle", "slot"]

@@ -13,8 +13,7 @@ from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.finger import axis_motion
-from fingervision.rendering.outline import Outline, Piece
-from fingervision.rendering.plane import SAME_POINT_PX
+from fingervision.rendering.outline import SAME_POINT_PX, Outline, Piece
 from fingervision.rendering.scene import Scene
 
 # Number of points on each piece that bracket its extremum before the refinement.

@@ -8,7 +8,7 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.errors import DataError
 from fingervision.rendering.finger import Finger, Highlight, SquareTip, Tip, axis_motion, finger_shape, highlight_shape
 from fingervision.rendering.light import EVEN_LIGHT, Light
-from fingervision.rendering.plane import Motion
+from fingervision.rendering.outline import Motion
 from fingervision.rendering.scene import Patch, Rim, Scene
 from fingervision.rendering.truth import measuring_point
 

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.batch.digest import Digest
 from fingervision.batch.overview import table_text
 from fingervision.batch.reduction import reduction_of
-from fingervision.batch.task import Outcome
+from fingervision.batch.task import Digest, Outcome
 
 COLUMN = reduction_of("measure").COLUMNS[0]
 

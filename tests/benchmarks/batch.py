@@ -23,10 +23,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from fingervision.batch.digest import CURVE_POINTS, Digest
 from fingervision.batch.fingerprint import content_hash, stamp_of
 from fingervision.batch.result_folder import Record, write_record
 from fingervision.batch.run import MARK
+from fingervision.batch.task import CURVE_POINTS, Digest
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.rendering.clip import H264, write_clip

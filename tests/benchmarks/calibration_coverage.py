@@ -25,7 +25,7 @@ from calib.measured_scale import Reference
 from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
-from fingervision.measuring.bias_share import bias_shares
+from fingervision.measuring.gap_budget import bias_shares
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.lens import RadialLens, Tilt
 from fingervision.rendering.light import Light

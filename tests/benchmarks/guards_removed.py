@@ -153,11 +153,11 @@ GUARDS = (
         ATTACKS, "pages_and_connections",
     ),
     Guarded(
-        "many idle connections", f"{LIVE}/half_open.py", "if len(waiting) > HALF_OPEN_AT_ONCE:", "if False:",
+        "many idle connections", f"{LIVE}/guard.py", "if len(waiting) > HALF_OPEN_AT_ONCE:", "if False:",
         STRANGERS, "idle_connections",
     ),
     Guarded(
-        "connection that never asks", f"{LIVE}/half_open.py", "call_later(ASKS_WITHIN_S,", "call_later(1e6,",
+        "connection that never asks", f"{LIVE}/guard.py", "call_later(ASKS_WITHIN_S,", "call_later(1e6,",
         STRANGERS, "never_asks",
     ),
     Guarded(

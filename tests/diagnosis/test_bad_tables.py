@@ -13,7 +13,7 @@ from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.plausibility import mixed_rows
 from fingervision.diagnosis.inference.searched import problem_of
 from fingervision.diagnosis.input.preparation import prepare
-from fingervision.diagnosis.report.open_parameters import open_parameters
+from fingervision.diagnosis.report.sentences import open_parameters
 from fingervision.domain.errors import DataError, ExitCode, FingervisionError
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
 from fingervision.diagnosis.report.answer_files import write_answer
-from fingervision.diagnosis.report.clock_words import within_clock
-from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.diagnosis.report.figure_files import residual_figure
+from fingervision.diagnosis.report.sentences import within_clock
 from fingervision.domain.report import Place
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model

@@ -8,8 +8,7 @@ import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.diagnosis.report.html_parts import with_uncertainty
-from fingervision.diagnosis.report.open_parameters import draws_of, limited
-from fingervision.diagnosis.report.sentences import phrase
+from fingervision.diagnosis.report.sentences import draws_of, limited, phrase
 from fingervision.domain.parameter import Estimate, Parameter
 from fingervision.domain.report import NamedEffect
 from fingervision.storage.measured_table import read_measured_table

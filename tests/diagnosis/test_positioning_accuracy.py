@@ -12,8 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingervision.diagnosis.report.positioning_accuracy import positioning_accuracy
-from fingervision.diagnosis.report.positioning_of_data import positioning_document, positioning_rows, positioning_words
-from fingervision.diagnosis.report.positioning_report import effect_changes, positioning_report
+from fingervision.diagnosis.report.positioning_of_data import (
+    effect_changes,
+    positioning_document,
+    positioning_report,
+    positioning_rows,
+    positioning_words,
+)
 from fingervision.motion.repeated_targets import RepeatedTargets
 
 RIGS = Path(__file__).parents[3] / "shared" / "real" / "rigs"

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.diagnosis.report.positioning_figures import DEFINITIONS
+from fingervision.diagnosis.report.positioning_accuracy import DEFINITIONS
 from fingervision.diagnosis.report.positioning_of_data import (
     MODEL,
+    PositioningReport,
     positioning_document,
     positioning_html,
     positioning_of_data,
@@ -18,7 +19,6 @@ from fingervision.diagnosis.report.positioning_of_data import (
     positioning_section,
     positioning_words,
 )
-from fingervision.diagnosis.report.positioning_report import PositioningReport
 from fingervision.motion.repeated_targets import NoRepeatedTargets
 from fingervision.storage.model_toml import read_model
 from fingervision.tables.read import read_measured_table

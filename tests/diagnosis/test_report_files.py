@@ -14,11 +14,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
-from fingervision.diagnosis.report.effect_figure import effect_figure
-from fingervision.diagnosis.report.figure_files import gap_against_input
+from fingervision.diagnosis.report.figure_files import effect_figure, gap_against_input
 from fingervision.diagnosis.report.frame_strip import strip_html, turning_rows
-from fingervision.diagnosis.report.gap_curves import GapCurves
-from fingervision.diagnosis.report.html_parts import bullets, named
+from fingervision.diagnosis.report.html_parts import GapCurves, bullets, named
 from fingervision.domain.errors import UsageError
 from fingervision.effects import catalogue
 

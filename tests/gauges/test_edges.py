@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.reading import GaugeStatus
 from tests.gauges.drawn import bar, drawn, half_plane, seen
 from tests.gauges.followed import followed, gauges_of, share_within
 

@@ -7,7 +7,7 @@ import pytest
 import skimage.data
 from scipy.ndimage import gaussian_filter
 
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.reading import GaugeStatus
 from tests.benchmarks.drawn_surfaces import SURFACES
 from tests.gauges.drawn import Texture, seen
 from tests.gauges.followed import followed, gauges_of, share_within

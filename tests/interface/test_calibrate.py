@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import fingervision as fv
 from fingervision.cli import cli
 from fingervision.domain.errors import ArgumentError
-from fingervision.interface.example_pictures import board_pictures, micrometer
+from fingervision.interface.examples import board_pictures, micrometer
 
 FOLDER = Path(__file__).parents[2] / "sample_frames/reference"
 SIZES = {"bar_05mm.png": 5.0, "bar_11mm.png": 11.0, "bar_17mm.png": 17.0}

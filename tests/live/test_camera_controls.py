@@ -19,8 +19,7 @@ from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.frames.controls import CameraControl, adjust, controls_of
 from fingervision.frames.received import Received
 from fingervision.frames.source import Description
-from fingervision.live.adjustments import Adjustments
-from fingervision.live.capture import Capture
+from fingervision.live.capture import Adjustments, Capture
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey, section
 from fingervision.live.commands.camera import CameraError
@@ -236,7 +235,7 @@ def test_a_camera_that_comes_back_gets_what_was_chosen(session: Session, cameras
 def test_a_camera_that_is_silent_says_so_and_is_not_changed_later(
     session: Session, cameras: list[PluginCamera], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fingervision.live.adjustments.ANSWERED_WITHIN_S", 0.2)
+    monkeypatch.setattr("fingervision.live.capture.ANSWERED_WITHIN_S", 0.2)
     cameras[0].is_stuck = True
     time.sleep(0.05)
     with pytest.raises(CameraError, match="does not answer, so that its exposure was not changed"):

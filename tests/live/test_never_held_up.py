@@ -26,10 +26,10 @@ from fingervision.live import capture as capture_module
 from fingervision.live import page_socket, server
 from fingervision.live import recorder as recorder_module
 from fingervision.live.cadence import Cadence
+from fingervision.live.capture import OverflowReport
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.opening import opened
-from fingervision.live.overflow_report import OverflowReport
 from fingervision.live.preview import Known, message, state_has_changed
 from fingervision.live.recorder import minutes_left
 from fingervision.live.running import PATIENCE_S, JsonLines, Outlet

@@ -168,7 +168,7 @@ def test_wrong_wishes_are_refused_in_a_sentence(playback: Playback) -> None:
 
 def test_a_lost_frame_is_shown_as_lost(playback: Playback) -> None:
     from fingervision.domain.status import Status
-    from fingervision.live.playback.recorded_frame import recorded_frame
+    from fingervision.live.playback.recorded import recorded_frame
 
     lost = LostFrame(4, 0.16, Status.DAMAGED, "It could not be decoded.")
     seen = recorded_frame(lost, None, Choices(scale=BareScale(34.0)), playback.description)

@@ -14,7 +14,7 @@ from calib.calibration import BareScale
 from fingervision.domain.errors import UsageError
 from fingervision.frames.network_stream import without_password
 from fingervision.frames.source import Wish
-from fingervision.live import half_open, server
+from fingervision.live import guard, server
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
 from fingervision.live.opening import opened
@@ -51,7 +51,7 @@ def status(address: str) -> int:
 
 
 def test_idle_connections_lock_nobody_out(page: server.Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(half_open, "ASKS_WITHIN_S", 60.0)
+    monkeypatch.setattr(guard, "ASKS_WITHIN_S", 60.0)
     port = int(page.address.split(":")[2].split("/")[0])
     held = [socket.create_connection(("127.0.0.1", port)) for _ in range(IDLE)]
     held[0].sendall(b"GET / HT")
@@ -75,7 +75,7 @@ def test_every_answer_keeps_the_page_to_itself(page: server.Page) -> None:
 
 def test_who_never_asks_is_let_go(page: server.Page, monkeypatch: pytest.MonkeyPatch) -> None:
     assert status(page.address) == 200
-    monkeypatch.setattr(half_open, "ASKS_WITHIN_S", 0.1)
+    monkeypatch.setattr(guard, "ASKS_WITHIN_S", 0.1)
     port = int(page.address.split(":")[2].split("/")[0])
     with socket.create_connection(("127.0.0.1", port), timeout=OPENED_WITHIN_S) as held:
         held.sendall(b"GET / HT")

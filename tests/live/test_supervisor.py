@@ -17,7 +17,7 @@ from fingervision.cli import cli
 from fingervision.domain.errors import OutputError
 from fingervision.frames.source import Wish
 from fingervision.interface.examples import copy_example
-from fingervision.live import preview, processor_use
+from fingervision.live import preview
 from fingervision.live import recorder as recorder_module
 from fingervision.live.choices import Choices
 from fingervision.live.commands import measuring
@@ -184,8 +184,8 @@ def test_a_recording_that_is_too_slow_names_the_bottleneck(
     monkeypatch.setattr(recorder_module, "FRAMES_WAITING", 30)
 
     def work(*_: object) -> None:
-        end_s = processor_use.thread_time() + 0.05
-        while is_busy and processor_use.thread_time() < end_s:
+        end_s = recorder.thread_time() + 0.05
+        while is_busy and recorder.thread_time() < end_s:
             pass
         if not is_busy:
             time.sleep(0.05)

@@ -23,7 +23,6 @@ from fingervision.live.frame_measurement import Seen
 from fingervision.live.opening import opened as opened_source
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
-from fingervision.live.session_state import state_of_choices
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.settings_toml import read_settings
 from tests.live.browser import browser, needs_chromium, opened, says, shown
@@ -107,13 +106,13 @@ def test_what_cannot_be_asked_here_ends_nothing(session: Session, request_: dict
 
 def test_a_scale_is_stated_with_its_uncertainty_and_saved_with_it(session: Session) -> None:
     obey(session, {"do": "scale", "px_per_mm": 34.0, "u_px_per_mm": 0.1})
-    state = state_of_choices(session.choices)
+    state = session.choices.state()
     assert (state["px_per_mm"], state["u_px_per_mm"]) == (34.0, pytest.approx(0.1))
     obey(session, {"do": "save_settings"})
     settings = read_settings(session.out / "settings.toml")
     assert (settings["px_per_mm"], settings["u_px_per_mm"]) == (34.0, pytest.approx(0.1))
     obey(session, {"do": "scale", "px_per_mm": 20.0, "u_px_per_mm": None})
-    assert state_of_choices(session.choices)["u_px_per_mm"] is None
+    assert session.choices.state()["u_px_per_mm"] is None
 
 
 TWENTY: list[Any] = [

@@ -9,7 +9,7 @@ import pytest
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import FingerEdge, GapMeasurement
-from fingervision.measuring.bias_share import bias_shares
+from fingervision.measuring.gap_budget import bias_shares
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.picture import render
 from fingervision.rendering.two_fingers import two_fingers

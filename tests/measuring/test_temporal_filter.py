@@ -8,12 +8,13 @@ import pytest
 from calib.calibration import BareScale
 from fingervision.domain.camera import CameraQuantity, Origin
 from fingervision.domain.direction import Direction
+from fingervision.domain.frame import Frame
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.measuring.camera_learning import camera_of
 from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.task import Task
-from fingervision.measuring.temporal_filter import Lagging
+from fingervision.measuring.temporal_filter import with_lag
 from fingervision.vision.pipeline import Settings
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX
 from tests.benchmarks.unknown_cameras import CURVES, PX_PER_MM, Recording, drawn, noise_reduced
@@ -52,11 +53,11 @@ def gap_at(place: float) -> GapMeasurement:
 
 
 def test_the_uncertainty_is_that_of_the_way_during_the_lag() -> None:
+    frames = [Frame(np.zeros((2, 2), np.uint8), k) for k in range(5)]
     outcomes = [gap_at(90.0), gap_at(90.0), NoGap(Status.TOUCHING, ""), gap_at(92.0), gap_at(92.0)]
-    lagging, lag = Lagging(), CameraQuantity(3.0, 0.1, Origin.LEARNT)
-    found = [lagging.added(index, outcome, lag) for index, outcome in enumerate(outcomes)]
+    items = list(zip(frames, outcomes, strict=True))
+    found = [outcome for _, outcome in with_lag(items, CameraQuantity(3.0, 0.1, Origin.LEARNT))]
     # From frame 1 to frame 3 the gap grows by 1 px a frame, and 3 frames of lag are 3 px (rectangular distribution).
-    assert [each.u_shift_px for each in found if isinstance(each, GapMeasurement)] == pytest.approx([0, 0, 3.0**0.5, 0])
+    assert [getattr(each, "u_shift_px", None) for each in found] == pytest.approx([0.0, 0.0, None, 3.0**0.5, 0.0])
     assert [getattr(each, "beside", None) for each in found] == ["", "", None, "trail", ""]
-    still = Lagging()
-    assert [still.added(k, outcome, CameraQuantity(0.0)) for k, outcome in enumerate(outcomes)] == outcomes
+    assert [outcome for _, outcome in with_lag(items, CameraQuantity(0.0))] == outcomes

@@ -9,8 +9,7 @@ import pytest
 from fingervision.domain.errors import DataError, OutputError
 from fingervision.domain.frame import Frame
 from fingervision.rendering.camera import Camera
-from fingervision.rendering.clip import H264, Codec, Ffv1, Mjpeg, write_clip
-from fingervision.rendering.jpeg import through_jpeg
+from fingervision.rendering.clip import H264, Codec, Ffv1, Mjpeg, through_jpeg, write_clip
 from fingervision.rendering.picture import render
 from fingervision.rendering.two_fingers import two_fingers
 

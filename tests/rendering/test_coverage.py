@@ -11,8 +11,7 @@ from scipy.special import erf
 
 from fingervision.domain.region import Region
 from fingervision.rendering.coverage import coverage
-from fingervision.rendering.outline import disc
-from fingervision.rendering.plane import Motion
+from fingervision.rendering.outline import Motion, disc
 from fingervision.rendering.polygon import polygon
 
 # The Gaussian's tail beyond REACH_SIGMAS, left out on both sides, holds 6e-7; what is left of it here is a sixth.

@@ -8,10 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingervision.domain.errors import DataError
-from fingervision.rendering.arc import Arc
-from fingervision.rendering.line import Line
-from fingervision.rendering.outline import Outline, disc
-from fingervision.rendering.plane import Motion
+from fingervision.rendering.outline import Arc, Line, Motion, Outline, disc
 from fingervision.rendering.polygon import polygon
 
 # Rounding of closed forms with coordinates of some hundred pixels.

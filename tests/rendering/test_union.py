@@ -7,11 +7,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from fingervision.rendering.outline import disc
-from fingervision.rendering.plane import Motion
-from fingervision.rendering.polygon import polygon
+from fingervision.rendering.outline import Motion, disc
+from fingervision.rendering.polygon import polygon, union
 from fingervision.rendering.two_fingers import two_fingers
-from fingervision.rendering.union import union
 
 # Rounding of closed forms with coordinates of some hundred pixels.
 AREA_PX2 = 1e-7

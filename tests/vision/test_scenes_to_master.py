@@ -20,8 +20,8 @@ from fingervision.rendering import (
     truth,
     two_fingers,
 )
-from fingervision.rendering.jpeg import through_jpeg
-from fingervision.rendering.plane import Motion
+from fingervision.rendering.clip import through_jpeg
+from fingervision.rendering.outline import Motion
 from fingervision.rendering.polygon import polygon
 from fingervision.vision.pipeline import Settings, measure_frame
 

@@ -10,7 +10,7 @@ from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.rendering import Camera, Light, Patch, Scene, dust, render, two_fingers
-from fingervision.rendering.plane import Motion
+from fingervision.rendering.outline import Motion
 from fingervision.rendering.polygon import polygon
 from fingervision.vision.pipeline import Settings, measure_frame
 

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.diagnosis.diagnose import Diagnosis
-from fingervision.diagnosis.report.figure_files import write_figures
+from fingervision.diagnosis.report.figure_files import residual_figure, write_figures
 from fingervision.diagnosis.report.frame_strip import strip_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_section
 from fingervision.diagnosis.report.report_page import curves_of, report_page
-from fingervision.diagnosis.report.residual_channels import by_channel
-from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.diagnosis.report.residual_localization import by_channel
 from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR
 from fingervision.domain.effect import effect_key
 from fingervision.domain.parameter import Estimate

@@ -8,13 +8,20 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from fingervision.diagnosis.compare import Comparison
-from fingervision.diagnosis.report.chart_data import charts_of
-from fingervision.diagnosis.report.figure_files import write_figures
+from fingervision.diagnosis.report.figure_files import png_bytes, residual_figure, write_figures
 from fingervision.diagnosis.report.frame_strip import strip_html
-from fingervision.diagnosis.report.gap_curves import GapCurves, gap_curves
-from fingervision.diagnosis.report.html_parts import HINT, bullets, chart, number, page, provenance_html, table
-from fingervision.diagnosis.report.residual_figure import residual_figure
-from fingervision.diagnosis.report.vector_figure import png_bytes
+from fingervision.diagnosis.report.html_parts import (
+    HINT,
+    GapCurves,
+    bullets,
+    chart,
+    charts_of,
+    gap_curves,
+    number,
+    page,
+    provenance_html,
+    table,
+)
 from fingervision.storage.provenance import Provenance
 
 PAGE, COMPARISON, PICTURE = "compare.html", "compare.json", "compare.png"

@@ -21,13 +21,15 @@ from fingervision.diagnosis.inference.verdict import verdict
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.report.left_out_rows import outlier_rows, outliers
-from fingervision.diagnosis.report.open_parameters import draws_of, limited, open_parameters
-from fingervision.diagnosis.report.residual_channels import by_channel, places
+from fingervision.diagnosis.report.residual_localization import by_channel, places
 from fingervision.diagnosis.report.sentences import (
     COVERAGE_FACTOR,
     answer,
     beyond_the_search,
+    draws_of,
     input_dominates,
+    limited,
+    open_parameters,
     remaining,
     required_words,
     rows_beyond_model,

@@ -1,15 +1,185 @@
 """The plots of a report as files: gap against input, gap over time and residuals, each as SVG and PDF."""
 
+import io
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.report.gap_curves import GapCurves
-from fingervision.diagnosis.report.vector_figure import FORMATS, plain_style, write_vector
-from fingervision.domain.effect import Array, Flags
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
+from fingervision.diagnosis.report.html_parts import GapCurves
+from fingervision.diagnosis.report.left_out_rows import outside_words
+from fingervision.domain.effect import Array, Flags, History
+from fingervision.effects import catalogue
+from fingervision.models.table import TableModel
+
+# Plots as files for a paper: SVG and PDF, identical for identical data; PNG for an HTML page.
+
+
+FORMATS = ("svg", "pdf")
+PNG_DPI = 110
+"""Resolution of the pictures beside the vector figures: about one pixel of a desktop screen per pixel."""
+
+
+def plain_style() -> AbstractContextManager[None]:
+    """Apply the common style of a report's plots; text is stored as text, so that it can be searched and edited."""
+    style: dict[str, object] = {
+        "font.size": 9,
+        "axes.titlesize": 10,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "svg.fonttype": "none",
+        "svg.hashsalt": "fingervision",
+        "pdf.fonttype": 42,
+    }
+    return mpl.rc_context(style)  # type: ignore[arg-type]
+
+
+def write_vector(figure: Figure, stem: Path) -> tuple[Path, ...]:
+    """Write a plot as SVG and as PDF; `stem` is the path without its suffix."""
+    written = []
+    for kind in FORMATS:
+        path = stem.with_name(f"{stem.name}.{kind}")
+        metadata = {"Date": None} if kind == "svg" else {"CreationDate": None, "Producer": None}
+        with plain_style():
+            figure.savefig(path, format=kind, metadata=metadata)
+        written.append(path)
+    return tuple(written)
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """Encode a plot as PNG."""
+    buffer = io.BytesIO()
+    with plain_style():
+        figure.savefig(buffer, format="png", dpi=PNG_DPI)
+    return buffer.getvalue()
+
+
+# Plot of the residuals before and after the correction, over the input and over time.
+
+
+BEFORE, AFTER, LEFT_OUT = "#c0392b", "#1f618d", "0.55"
+STYLES: dict[str, dict[str, object]] = {
+    "before": {"marker": "x", "linestyle": "", "color": BEFORE, "mew": 0.7},
+    "after": {"marker": "o", "linestyle": "", "color": AFTER},
+}
+NAMES = {
+    "gap": "gap",
+    "left": "left finger",
+    "right": "right finger",
+    "midline": "midline",
+}
+
+
+def residual_figure(
+    before: dict[str, Array], after: dict[str, Array] | None, history: History, left_out: Sequence[int] = ()
+) -> Figure:
+    """Plot measured minus predicted values, one row per channel, over the input and (if there are times) over time.
+
+    Parameters
+    ----------
+    before, after : dict of ndarray of float, shape (n,)
+        Residuals in mm, by channel; `after` is None if no effect was added.
+    history : History
+        Input and times.
+    left_out : sequence of int
+        Rows that the figures of the report do not count: drawn grey and hollow, and not considered by the scales.
+    """
+    timed = history.time_s is not None
+    counts = np.ones(history.input_mm.size, dtype=bool)
+    counts[list(left_out)] = False
+    drawn = {"before": before} | ({} if after is None else {"after": after})
+    with plain_style():
+        figure = Figure(figsize=(10.0, 1.2 + 2.1 * len(before)), layout="constrained")
+        grid = figure.subplots(len(before), 2 if timed else 1, squeeze=False, sharey="row")
+        for row, channel in enumerate(before):
+            panels = [(history.input_mm, "recorded input, mm")]
+            if timed:
+                clock = history.clock_s if history.shared_clock else np.arange(history.input_mm.size, dtype=np.float64)
+                panels.append((clock, "time, s" if history.shared_clock else "sample"))
+            for column, (x, beneath) in enumerate(panels):
+                axes = grid[row][column]
+                size = 6 if x.size < 60 else 3
+                axes.axhline(0.0, color="0.6", linewidth=0.8)
+                for label, residual in drawn.items():
+                    style = STYLES[label] | {"markersize": (1.0 if label == "before" else 0.6) * size}
+                    axes.plot(x[counts], residual[channel][counts], label=label, **style)
+                if left_out:
+                    _left_out(
+                        axes, x[~counts], list(drawn.values())[-1][channel][~counts], note=column == len(panels) - 1
+                    )
+                if row == len(before) - 1:
+                    axes.set_xlabel(beneath)
+                if column == 0:
+                    axes.set_ylabel(
+                        f"{NAMES.get(channel, channel)}\nmeasured - model, {'N' if channel == 'force' else 'mm'}"
+                    )
+        if after is not None or left_out:
+            grid[0][0].legend(
+                frameon=False, ncols=3, markerscale=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1
+            )
+    return figure
+
+
+def _left_out(axes: Axes, x: Array, residual: Array, *, note: bool) -> None:
+    """Mark rows left out, without a change of the scale; a note states how many rows lie outside the plot."""
+    low, high = axes.get_ylim()
+    axes.plot(x, residual, "o", color=LEFT_OUT, markerfacecolor="none", markersize=4, mew=0.8, label="left out")
+    axes.set_ylim(low, high)
+    words = outside_words(residual, low, high)
+    if note and words:
+        axes.set_title(words, loc="right", fontsize="x-small", color="0.35")
+
+
+# Plot of an effect's residual: an ideal linear gripper is opened, held and closed, with and without the effect.
+
+
+SHOWN_SHARE = 0.2
+"""Size of the parameters in the plot, as a share of their range, so that the shape is clearly visible."""
+
+
+def effect_figure(name: str) -> Figure:
+    """Draw the residual that an effect causes."""
+    effect = catalogue()[name]
+    input_mm = np.array([-0.6, 1.6])
+    gap_mm = 4.0 + 7.7 * input_mm
+    model = TableModel("straight", input_mm, -0.5 * gap_mm, 0.5 * gap_mm, 2.0 * input_mm)
+    up, hold = np.linspace(-0.5, 1.5, 200), np.full(100, 1.5)
+    u = np.concatenate([up, hold, up[::-1], np.full(100, -0.5), up[:120], up[120:60:-1]])
+    history = History(
+        input_mm=u,
+        time_s=np.arange(u.size, dtype=np.float64) * np.float64(0.05),
+        runs=(slice(0, u.size),),
+        rest_gap_mm=4.0,
+        opening_mm=float(np.max(np.abs(7.7 * u))),
+        closing_mm=3.85,
+        force=True,
+    )
+    searched = effect.search(history)
+    values = {}
+    for p in effect.parameters if isinstance(searched, str) else searched:
+        if p.name in effect.drawn_with:
+            values[p.name] = effect.drawn_with[p.name]
+        elif p.logarithmic or p.reciprocal:
+            values[p.name] = float(np.sqrt(max(p.lower, 1e-2 * p.upper) * p.upper))
+        else:
+            values[p.name] = p.upper * SHOWN_SHARE if p.neutral is not None else 0.5 * (p.lower + p.upper)
+    chain = MeasuringChain(model, history, {})
+    bare, with_it = chain.respond({}), chain.respond({name: values})
+    if effect.needs_force:
+        return residual_figure({"force": 1.0 * (np.asarray(with_it.force_n) - np.asarray(bare.force_n))}, None, history)
+    residual = {
+        "gap": with_it.gap_mm - bare.gap_mm,
+        "left": with_it.left_mm - bare.left_mm,
+        "right": with_it.right_mm - bare.right_mm,
+    }
+    return residual_figure(residual, None, history)
+
 
 # Plots of gap against input, and of gap over time: measurement, simulation, corrected model.
 

@@ -9,13 +9,14 @@ import numpy as np
 from fingervision.diagnosis.bodies.body_evidence import drawing_of
 from fingervision.diagnosis.diagnose import Diagnosis
 from fingervision.diagnosis.inference.verdict import UNDECIDED
-from fingervision.diagnosis.report.chart_data import charts_of
-from fingervision.diagnosis.report.effect_figure import effect_figure
-from fingervision.diagnosis.report.gap_curves import GapCurves, gap_curves
+from fingervision.diagnosis.report.figure_files import effect_figure, png_bytes, residual_figure
 from fingervision.diagnosis.report.html_parts import (
     HINT,
+    GapCurves,
     bullets,
     chart,
+    charts_of,
+    gap_curves,
     named,
     number,
     page,
@@ -26,10 +27,8 @@ from fingervision.diagnosis.report.html_parts import (
 from fingervision.diagnosis.report.mechanism_sketch import sketch_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.report_parts import added_sections
-from fingervision.diagnosis.report.residual_channels import by_channel
-from fingervision.diagnosis.report.residual_figure import residual_figure
+from fingervision.diagnosis.report.residual_localization import by_channel
 from fingervision.diagnosis.report.sentences import EDGES, QUESTION
-from fingervision.diagnosis.report.vector_figure import png_bytes
 from fingervision.domain.report import DiagnosisReport, Disagreement, Verdict
 from fingervision.effects import catalogue
 from fingervision.storage.provenance import Provenance

@@ -1,15 +1,16 @@
 """The result as sentences: what the model lacks, what remains unexplained, which rows were excluded."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.verdict import UNDECIDED, Standing
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.report.open_parameters import open_parameters
-from fingervision.domain.parameter import Estimate
-from fingervision.domain.report import Disagreement, NamedEffect, Verdict
+from fingervision.domain.effect import Array
+from fingervision.domain.parameter import Estimate, Parameter
+from fingervision.domain.report import Disagreement, NamedEffect, Place, Verdict
 
 COVERAGE_FACTOR = 2.0
 """Coverage factor of an expanded uncertainty: about 95 % for a normal distribution (JCGM 100:2008, 6.2)."""
@@ -180,3 +181,140 @@ def input_dominates(data: Observations, problem: Problem) -> tuple[str, ...]:
             f"the error of the recorded input ({error:.2g} mm of gap) is larger than the error of the measured gap.",
         )
     return ()
+
+
+# Parameters that may lie beyond their search range, such as the time constant of a warming longer than the table.
+
+
+COVERED = 2.0
+"""Standard uncertainties that must fit between a value and the end of its range: the usual expanded uncertainty."""
+TAIL = 0.05
+"""Probability beyond a one-sided 95 % limit."""
+
+
+def open_parameters(best: Explanation, problem: Problem) -> list[tuple[str, Parameter]]:
+    """Find time constants and widths for which the data give no upper limit within their search range.
+
+    Beyond the upper end of the search range of a time constant, the effect does not change: an exponential at its
+    beginning is a straight line, of which only the slope is known. If the posterior were limited to the search range,
+    the stated uncertainties of time constant and amplitude would be too small.
+
+    Parameters
+    ----------
+    best : Explanation
+        The best explanation, with its covariance.
+    problem : Problem
+        Estimation problem with the search ranges.
+
+    Returns
+    -------
+    list of (str, Parameter)
+        Effects with the parameter.
+    """
+    listed = [entry for entry in problem.parameters(best.names) if entry[1].run is None]
+    u = np.sqrt(np.maximum(np.diag(best.covariance), 0.0))
+    return [
+        (name, parameter)
+        for i, (name, parameter) in enumerate(listed)
+        if parameter.unit == "s"
+        and parameter.neutral is None
+        and best.values[name][parameter.name] + COVERED * u[i] >= parameter.upper
+    ]
+
+
+def limited(value: float, parameter: Parameter, drawn: Array, open_ended: Array) -> Estimate:
+    """State a parameter by a one-sided limit, on the side opposite to that on which another parameter is unbounded.
+
+    The posterior ends where the search range ends. Beyond the search range, all values of the parameter are farther
+    from the limit, so that the quantile within the range is also a limit for the whole posterior.
+
+    Parameters
+    ----------
+    value : float
+        Value with which the prediction was computed.
+    parameter : Parameter
+        The parameter.
+    drawn, open_ended : ndarray of float, shape (k,)
+        Posterior draws of this parameter and of the open one (the same, for the open parameter itself).
+    """
+    if not drawn.size:
+        return Estimate(value, None, parameter.unit)
+    along = float(np.mean((drawn - drawn.mean()) * (np.log(open_ended) - np.log(open_ended).mean())))
+    if along == 0.0:
+        return Estimate(value, None, parameter.unit)
+    if along > 0.0:
+        return Estimate(value, None, parameter.unit, at_least=float(np.quantile(drawn, TAIL)))
+    return Estimate(value, None, parameter.unit, at_most=float(np.quantile(drawn, 1.0 - TAIL)))
+
+
+def draws_of(posterior: tuple[Point, ...], effect: str, parameter: str) -> Array:
+    """Posterior draws of one parameter, shape (k,); empty if the parameter was not sampled."""
+    return np.array([point[effect][parameter] for point in posterior if parameter in point.get(effect, {})])
+
+
+# Differences between opening and closing that the uncertain offset between two clocks explains.
+
+
+ALIKE = 0.25
+"""Largest relative difference between the offsets that opening and closing require. Their mean, the only possible
+offset, then leaves at most a seventh of each difference."""
+STILL = 0.05
+"""Share of the largest speed below which the input counts as at rest, as in the search for places."""
+WAYS = {"input, opening": 1.0, "input, closing": -1.0}
+"""Variables of regions that exist in one direction of the input only, with the sign of the input's speed."""
+
+
+def within_clock(places: Sequence[Place], data: Observations) -> tuple[Place, ...]:
+    """Add a remark to regions whose difference between opening and closing a clock offset explains.
+
+    A clock that is late by t changes the gap by the speed of the gap times t, and so by opposite amounts for opening
+    and closing. A difference is attributed to the clocks only if it is found in both directions, and if the clock
+    offset that it requires is within the expanded uncertainty of the clocks.
+
+    Parameters
+    ----------
+    places : sequence of Place
+        Regions where measurement and model disagree.
+    data : Observations
+        Measurement and model.
+    """
+    expanded_s = COVERAGE_FACTOR * data.table.u_clock_s
+    if expanded_s == 0.0 or data.chain.history.time_s is None:
+        return tuple(places)
+    gap_mm_s = _gap_speed(data)
+    late_s = {i: _late_s(place, data, gap_mm_s) for i, place in enumerate(places)}
+    # Take the largest region of each direction; the smaller ones were found after its subtraction.
+    first: dict[str, tuple[int, float]] = {}
+    for i, by_s in late_s.items():
+        if by_s is not None and abs(by_s) <= expanded_s:
+            first.setdefault(places[i].variable, (i, by_s))
+    if len(first) < len(WAYS):
+        return tuple(places)
+    (one, by_s), (other, too_s) = first.values()
+    if abs(by_s - too_s) > ALIKE * max(abs(by_s), abs(too_s)):
+        return tuple(places)
+    words = (
+        f" (clocks {1e3 * abs(by_s + too_s) / 2.0:.2g} ms apart would cause the same difference in both directions; "
+        f"the offset of the clocks has U = {1e3 * expanded_s:.2g} ms, k = 2)"
+    )
+    return tuple(
+        replace(place, words=place.words + words) if i in (one, other) else place for i, place in enumerate(places)
+    )
+
+
+def _gap_speed(data: Observations) -> Array:
+    """Speed (mm/s) of the predicted gap, shape (n,)."""
+    return data.chain.history.rate_of(data.chain.respond({}).gap_mm)
+
+
+def _late_s(place: Place, data: Observations, gap_mm_s: Array) -> float | None:
+    """Offset between the clocks (s) that would explain the difference in a region; None for all other regions."""
+    if place.channel != "gap" or place.variable not in WAYS:
+        return None
+    history = data.chain.history
+    input_mm = history.input_mm
+    speed = history.rate_of(input_mm)
+    moves = WAYS[place.variable] * speed > STILL * np.max(np.abs(speed))
+    inside = moves & (input_mm >= place.start) & (input_mm <= place.end)
+    typical = float(np.median(gap_mm_s[inside])) if inside.any() else 0.0
+    return None if typical == 0.0 else place.size / typical

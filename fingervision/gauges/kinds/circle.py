@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from fingervision.gauges import common_keys
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance, Position
-from fingervision.gauges.reading import Mark, Reading
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.reading import GaugeStatus, Mark, Reading
 from fingervision.gauges.straight_edge import (
     CONTRAST_FLOOR,
     GUARD,

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 from fingervision.gauges.common_keys import EdgeKeys, edge_keys
-from fingervision.gauges.edge_follower import EdgeFollower
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Position
-from fingervision.gauges.reading import Mark, Reading
-from fingervision.gauges.status import GaugeStatus
-from fingervision.gauges.straight_edge import Axes, NotFound
+from fingervision.gauges.reading import GaugeStatus, Mark, Reading
+from fingervision.gauges.straight_edge import Axes, EdgeFollower, NotFound
 from fingervision.storage.toml_section import Section
 
 KEYS = ("x_px", "y_px", "direction_deg", "length_px", "reach_px", "polarity")

@@ -8,8 +8,7 @@ from fingervision.domain.region import Region
 from fingervision.gauges import common_keys
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance
-from fingervision.gauges.reading import Mark, Reading
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.reading import GaugeStatus, Mark, Reading
 from fingervision.storage.toml_section import Section
 from fingervision.vision.pipeline import measure_frame
 

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from math import atan, cos, hypot, pi, sin, sqrt
 
 from fingervision.gauges.common_keys import EdgeKeys, edge_keys
-from fingervision.gauges.edge_follower import EdgeFollower
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Angle, Position
-from fingervision.gauges.reading import Mark, Reading
-from fingervision.gauges.status import GaugeStatus
-from fingervision.gauges.straight_edge import Axes, NotFound
+from fingervision.gauges.reading import GaugeStatus, Mark, Reading
+from fingervision.gauges.straight_edge import Axes, EdgeFollower, NotFound
 from fingervision.storage.toml_section import Section
 
 KEYS = ("x_px", "y_px", "angle_deg", "length_px", "reach_px", "polarity")

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from fingervision.gauges import common_keys
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Position
-from fingervision.gauges.reading import Mark, Reading
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.reading import GaugeStatus, Mark, Reading
 from fingervision.gauges.straight_edge import CONTRAST_FLOOR, GUARD, MOST_TIMES
 from fingervision.storage.toml_section import Section
 from fingervision.vision.symmetry_fit import BEYOND_PX as WINDOW_BEYOND_PX

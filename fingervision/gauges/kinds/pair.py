@@ -4,13 +4,10 @@ from dataclasses import dataclass
 from math import hypot, sqrt
 
 from fingervision.gauges import common_keys
-from fingervision.gauges.edge_fit import fit_near
-from fingervision.gauges.edge_follower import EdgeFollower
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance
-from fingervision.gauges.reading import Mark, Reading
-from fingervision.gauges.status import GaugeStatus
-from fingervision.gauges.straight_edge import Axes, EdgeFound, NotFound
+from fingervision.gauges.reading import GaugeStatus, Mark, Reading
+from fingervision.gauges.straight_edge import Axes, EdgeFollower, EdgeFound, NotFound, fit_near
 from fingervision.storage.toml_section import Section
 from fingervision.vision.edge_search import StepCandidate
 from fingervision.vision.straight_edge_fit import reach_px

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from fingervision.gauges import common_keys
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Angle, Shift
-from fingervision.gauges.reading import Mark, Reading
-from fingervision.gauges.status import GaugeStatus
+from fingervision.gauges.reading import GaugeStatus, Mark, Reading
 from fingervision.storage.toml_section import Section
 from fingervision.vision.patch_covariance import reference_covariance
 from fingervision.vision.patch_reference import MARGIN_PX, PatchReference, patch_reference

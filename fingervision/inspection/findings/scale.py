@@ -8,7 +8,7 @@ from calib.measured_scale import Calibration
 from fingervision.domain.status import Status
 from fingervision.inspection.finding import Finding, refusing, weighed, without
 from fingervision.inspection.sample import FILLED, Sample
-from fingervision.measuring.bias_share import bias_shares
+from fingervision.measuring.gap_budget import bias_shares
 
 CLOSER = (
     "Bring the camera nearer, or use a lens of longer focal length, until fingers and gap fill most of the picture."

@@ -16,15 +16,19 @@ from fingervision.domain.frame import Frame
 from fingervision.domain.recipe import Recipe
 from fingervision.frames.received import Driven, Received
 from fingervision.frames.source import Description
+from fingervision.live.capture import Capture
+from fingervision.live.choices import Choices
 from fingervision.live.supervisor import Supervisor
 from fingervision.storage.samples_csv import SampleRow
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
+from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.manual.manual_control import Looking, home, jog, move
 from fingervision.testbed.run.controls import Controls
 from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testbed.run.synchronised_acquisition import Look, Sight
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
+from fingervision.testbed.simulation.parse_injected_effects import hidden_from
 
 # Largest number of frames that wait for the live view; further frames are dropped, because the bed does not wait.
 FRAMES_WAITING = 50
@@ -257,3 +261,34 @@ def _eyes(bed: Bed) -> Sight:
     sight = Sight(bed)
     sight.position.read()
     return sight
+
+
+# Open a test bed by name, with its camera as the live source.
+
+
+def opened_bed(name: str, hide: tuple[str, ...], choices: Choices) -> tuple[Capture, Choices]:
+    """Open a test bed; a simulated test bed runs in real time.
+
+    Parameters
+    ----------
+    name : str
+        The word "simulated", or the path of a configuration file.
+    hide : tuple of str
+        Effects injected into the simulated parts of the test bed.
+    choices : Choices
+        Settings chosen by the user; without a given scale and height, those of the test bed apply.
+
+    Raises
+    ------
+    DataError, InputFileError, UsageError
+        The test bed cannot be opened, or has neither camera nor scale.
+    """
+    hidden = hidden_from(hide)
+    bed = open_bed(name, hidden, pace=1.0)
+    try:
+        bench = Bench(bed, hidden)
+    except FingervisionError:
+        bed.close()
+        raise
+    chosen = replace(choices, scale=bed.scale, scale_file=None, below_tip_mm=bed.below_tip_mm)
+    return Capture(bench, again=None), chosen

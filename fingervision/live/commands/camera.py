@@ -8,7 +8,7 @@ from fingervision.frames.controls import FRAME_RATE, MOVES_SCALE, about_change
 from fingervision.live.commands.asking import Answer, Request, number, words
 from fingervision.live.session import Session
 from fingervision.live.view import View
-from fingervision.measuring.other_camera import other_camera
+from fingervision.measuring.scale import other_camera
 
 
 class CameraError(FingervisionError):

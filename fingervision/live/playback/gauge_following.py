@@ -13,9 +13,8 @@ from fingervision.gauges.gauge_file import Gauge
 from fingervision.gauges.kinds import measured_together
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
-from fingervision.gauges.reading import Mark, Reading, unread
+from fingervision.gauges.reading import MEANING, Mark, Reading, unread
 from fingervision.gauges.recording import cells_of
-from fingervision.gauges.status import MEANING
 from fingervision.live.playback.gauge_board import GaugeBoard
 from fingervision.live.playback.playback import Playback
 from fingervision.measuring.frame_loop import Prepared, coded, prepared

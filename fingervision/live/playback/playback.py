@@ -15,12 +15,10 @@ from fingervision.frames.seeking import Seeking, seeking
 from fingervision.frames.source import Description
 from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF
 from fingervision.live.frame_measurement import Seen
-from fingervision.live.messages import Message, MessageListener, Messages
-from fingervision.live.playback.recorded import Recorded
-from fingervision.live.playback.recorded_frame import recorded_frame
+from fingervision.live.playback.recorded import Recorded, recorded_frame
 from fingervision.live.playback.track import Track, arguments_of
-from fingervision.live.session_state import state_of_choices
 from fingervision.live.supervisor import Supervisor, told
+from fingervision.live.view import Message, MessageListener, Messages
 from fingervision.measuring.marked import marked
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.lost_frames import lost_frames
@@ -311,7 +309,7 @@ class Playback:
             "ended": bool(self.supervisor.trouble_of(PLAYING)),
             "trouble": self.supervisor.trouble,
             "recording": None,
-            **state_of_choices(self.choices),
+            **self.choices.state(),
         }
 
     @property
