@@ -12,7 +12,7 @@ from fingervision.cli.model import command
 from fingervision.domain.errors import DataError, FingervisionError, ModelError, UsageError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
-from fingervision.models.mechanism_figures import mechanism_figures
+from fingervision.models.mechanism_figures import response_figures
 from fingervision.storage.drawing_reader import number
 from fingervision.storage.mechanism_toml import is_mechanism, mechanism_from_tables, read_mechanism
 
@@ -138,14 +138,25 @@ def test_a_material_that_does_not_contract_is_drawn() -> None:
     assert soft < stiff  # without the restraint by its width
 
 
-def test_a_sharp_corner_without_a_flexure_states_no_stress() -> None:
+def test_thin_bars_are_flexures_although_they_are_drawn_as_bodies() -> None:
     drawn = tomllib.loads(STAGE)
     drawn["body"] += [{"bar_mm": [*(f"{side} * apart / 2", "-1", f"{side} * apart / 2", "leaf + 1")], "width_mm": "t"}
                       for side in ("-1", "1")]  # fmt: skip
     drawn["flexure"] = []
+    found = mechanism_from_tables(drawn, "m.toml").strips
+    named = mechanism_from_tables(tomllib.loads(STAGE), "m.toml").flexures
+    ours, theirs = (sorted(each.at_mm for each in flexures) for flexures in (found, named))
+    assert np.array(ours) == pytest.approx(np.array(theirs))
+    assert [strip.thickness_mm for strip in found] == pytest.approx([leaf.thickness_mm for leaf in named])
+
+
+def test_a_sharp_corner_without_a_flexure_states_no_stress() -> None:
+    drawn = tomllib.loads(STAGE)
+    drawn["body"] += [{"bar_mm": [0.0, "-1", 0.0, "leaf + 1"], "width_mm": "0.6 * leaf"}]
+    drawn["flexure"] = []
     plate = MechanismPlate(mechanism_from_tables(drawn, "m.toml"))
     assert np.isnan(plate.state(1.0).stress_mpa)
-    assert not any("stress" in name or "yield" in name for name in mechanism_figures(plate))
+    assert not any("stress" in name or "yield" in name for name in response_figures(plate))
 
 
 def test_a_mechanism_that_nothing_holds_is_refused() -> None:
