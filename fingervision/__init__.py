@@ -18,7 +18,9 @@ from importlib import import_module
 __version__ = "0.2.0"
 
 _HOMES = {
+    "Batch": "batch.run",
     "Calibration": "interface.calibration",
+    "Changes": "interface.healthy_reference",
     "Coding": "domain.frame",
     "Comparison": "interface.comparison",
     "Description": "frames.source",
@@ -28,15 +30,22 @@ _HOMES = {
     "Inspection": "interface.inspection",
     "LostFrame": "domain.frame",
     "Measurement": "interface.measurement",
+    "OpenBed": "interface.bed",
     "Parameter": "domain.parameter",
+    "Prediction": "interface.prediction",
+    "RunDone": "testbed.run.recipe_run",
     "Simulation": "interface.simulation",
     "Status": "domain.status",
+    "bed": "interface.bed",
     "calibrate": "interface.calibrate",
+    "changes_since": "interface.healthy_reference",
     "compare": "interface.comparison",
     "diagnose": "interface.diagnosis",
     "effect": "interface.own_effect",
+    "example": "interface.examples",
     "inspect": "interface.inspection",
     "measure": "interface.measure",
+    "model": "interface.prediction",
     "read_model": "interface.tables",
     "read_table": "interface.tables",
     "simulate": "interface.simulation",
@@ -65,14 +74,14 @@ _HOMES = {
     "StateError": "domain.errors",
     "UnknownNameError": "domain.errors",
 }
-"""Where each public name lives, below this package; `effects` is the sub-package itself."""
+"""Where each public name lives, below this package; `batch` and `effects` are the sub-packages themselves."""
 
-__all__ = ["__version__", "effects", *_HOMES]
+__all__ = ["__version__", "batch", "effects", *_HOMES]
 
 
 def __getattr__(name: str) -> object:
-    if name == "effects":
-        return import_module(f"{__name__}.effects")
+    if name in ("batch", "effects"):
+        return import_module(f"{__name__}.{name}")
     if name not in _HOMES:
         message = f"module {__name__!r} has no attribute {name!r}"
         raise AttributeError(message, name=name, obj=import_module(__name__))

@@ -1,5 +1,7 @@
 """Types of the public names, which `__init__.py` imports when they are first asked for."""
 
+from fingervision import batch as batch
+from fingervision.batch.run import Batch as Batch
 from fingervision.domain.errors import ArgumentError as ArgumentError
 from fingervision.domain.errors import ArgumentTypeError as ArgumentTypeError
 from fingervision.domain.errors import DataError as DataError
@@ -25,17 +27,24 @@ from fingervision.effects.effect_list import EffectList
 from fingervision.effects.trial import EffectAnswerError as EffectAnswerError
 from fingervision.frames.source import Description as Description
 from fingervision.frames.source import FrameSource as FrameSource
+from fingervision.interface.bed import OpenBed as OpenBed
+from fingervision.interface.bed import bed as bed
 from fingervision.interface.calibrate import calibrate as calibrate
 from fingervision.interface.calibration import Calibration as Calibration
 from fingervision.interface.comparison import Comparison as Comparison
 from fingervision.interface.comparison import compare as compare
 from fingervision.interface.diagnosis import Diagnosis as Diagnosis
 from fingervision.interface.diagnosis import diagnose as diagnose
+from fingervision.interface.examples import example as example
+from fingervision.interface.healthy_reference import Changes as Changes
+from fingervision.interface.healthy_reference import changes_since as changes_since
 from fingervision.interface.inspection import Inspection as Inspection
 from fingervision.interface.inspection import inspect as inspect
 from fingervision.interface.measure import measure as measure
 from fingervision.interface.measurement import Measurement as Measurement
 from fingervision.interface.own_effect import effect as effect
+from fingervision.interface.prediction import Prediction as Prediction
+from fingervision.interface.prediction import model as model
 from fingervision.interface.simulation import Simulation as Simulation
 from fingervision.interface.simulation import simulate as simulate
 from fingervision.interface.tables import read_model as read_model
@@ -47,6 +56,7 @@ from fingervision.plugins.faults import PluginShapeError as PluginShapeError
 from fingervision.plugins.faults import PluginTimeoutError as PluginTimeoutError
 from fingervision.plugins.faults import PluginVersionError as PluginVersionError
 from fingervision.tables.questions import OpenQuestionError as OpenQuestionError
+from fingervision.testbed.run.recipe_run import RunDone as RunDone
 
 __version__: str
 effects: EffectList

@@ -21,7 +21,7 @@ from fingervision.domain.errors import MissingLibraryError, ProcessError, UsageE
 
 # Versions of a worker's software, and a hash of the source code.
 
-LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "scikit-image", "av", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "av", "matplotlib")
 
 
 @cache

@@ -206,7 +206,7 @@ class Plan:
         return tuple(number for number in range(len(self.tasks)) if number not in self.done)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Batch:
     """Result of a batch.
 
@@ -226,6 +226,10 @@ class Batch:
     outcomes: tuple[Outcome, ...]
     fresh: int
     stopped: str
+
+    def __repr__(self) -> str:
+        there = sum(outcome.folder is not None for outcome in self.outcomes)
+        return f"Batch({there} of {len(self.outcomes)} inputs have a result, {self.fresh} new, in {self.out})"
 
     @property
     def bad(self) -> tuple[Outcome, ...]:

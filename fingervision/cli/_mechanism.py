@@ -1,8 +1,7 @@
 """`fingervision model mechanism.toml`: model a planar mechanism with finite elements and with lumped flexures."""
 
-import csv
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import click
@@ -13,21 +12,19 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from fingervision.cli._body_picture import draw_body, extent_mm, framed
-from fingervision.cli._mechanism_report import add_endurance, print_figures, say_drawing, say_endurance, warn
+from fingervision.cli._mechanism_report import add_endurance, say_drawing, say_endurance, say_refusals, warn
 from fingervision.cli._model_grip import part_of_pair, write_pair_grip
 from fingervision.cli._model_motion import MotionAsked, move
 from fingervision.cli._model_sweep import solve_mechanism, sweep_mechanism
 from fingervision.cli._model_uncertainty import write_uncertainty
-from fingervision.domain.errors import ArgumentError, FingervisionError, InstallationError, OutputError, UsageError
+from fingervision.interface.prediction import figures_csv, figures_text, naming, predict_mechanism
 from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.finite_element import MechanismPlate
-from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_chain import MechanismChain
-from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
+from fingervision.models.physics import Physics
 from fingervision.models.uncertainty import mechanism_uncertainty
 from fingervision.storage.mechanism_toml import read_drawing
-from fingervision.storage.simulation_table import POSE
+from fingervision.storage.out_folder import make_out_folder
 
 # Tables and plots of a mechanism whose drawing lists its bodies (mechanism.toml).
 
@@ -37,45 +34,6 @@ _IN_PLOT = 4
 _STILL = 0.01
 """If the relative change of a distance is smaller, the distance is plotted without its mean, whose digits would hide
 the change."""
-
-
-def write_figures(table: Mapping[str, Mapping[str, float]], path: Path) -> None:
-    """Write models.csv: one line per kind of model, with empty cells for results that a kind does not compute."""
-    labels = list(dict.fromkeys(label for figures in table.values() for label in figures))
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["kind", *labels])
-        for kind, figures in table.items():
-            writer.writerow([kind, *(f"{figures[label]:.7g}" if label in figures else "" for label in labels)])
-
-
-def write_states(states: Sequence[MechanismState], out: Path) -> None:
-    """Write mechanism.csv, and also simulation.csv if a pair of probes is named gap."""
-    columns: dict[str, list[float]] = {"input_mm": [s.input_mm for s in states], "force_n": [s.force_n for s in states]}
-    if len(states[0].drives_n) > 1:
-        columns |= {f"{name}_force_n": [s.drives_n[name] for s in states] for name in states[0].drives_n}
-    for name in states[0].probes_mm:
-        for place, axis in enumerate("xy"):
-            columns[f"{name}_{axis}_mm"] = [s.probes_mm[name][place] for s in states]
-    for name in states[0].pairs_mm:
-        columns[f"{name}_mm"] = [s.pairs_mm[name] for s in states]
-    for name in states[0].contact_n:
-        columns[f"{name}_contact_n"] = [s.contact_n[name] for s in states]
-    columns["stress_mpa"] = [s.stress_mpa for s in states]
-    poses = {
-        f"{name}.{part}": [getattr(s.bodies[name], part) for s in states] for name in states[0].bodies for part in POSE
-    }
-    columns |= poses
-    _table(columns, out / "mechanism.csv")
-    if "gap" in states[0].pairs_mm:
-        table = {name: columns[name] for name in ("input_mm", "gap_mm", "force_n")} | poses
-        _table(table, out / "simulation.csv")
-
-
-def _table(columns: dict[str, list[float]], path: Path) -> None:
-    rows = zip(*columns.values(), strict=True)
-    lines = [",".join(columns), *(",".join("" if np.isnan(value) else f"{value:.9g}" for value in row) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def draw_deformed(model: MechanismPlate, state: MechanismState, path: Path, *, large: bool) -> None:
@@ -148,15 +106,6 @@ def _lengths(mechanism: Mechanism, rows: Sequence[MechanismState]) -> dict[str, 
     }
 
 
-_KINDS = ("finite_element", "lumped")
-_ROWS = 21
-_MOST_ROWS = 41
-_OF_SIZE = 0.02
-"""Input that takes the place of the one at yield where no stress is stated, as a share of the drawing's size."""
-_OF_YIELD = 0.5
-"""Range of inputs without a drive table, in both directions, as a fraction of the input at which the flexures yield."""
-
-
 def predict(
     path: Path,
     kind: str,
@@ -185,24 +134,20 @@ def predict(
     if any(solve):
         solve_mechanism(drawing, *solve, out, as_json=as_json)
         return
-    with _naming(path):
+    with naming(path):
         mechanism = drawing.mechanism()
     gripped = part_of_pair(object_mm, object_n_mm, mechanism)
-    if contact and not mechanism.contacts:
-        raise UsageError(f"--contact needs a [[contact]] section that says which faces may touch, but {path} has none.")
-    if kind not in (*_KINDS, "stiffness_matrix", "all"):
-        raise UsageError(
-            f"A mechanism.toml can be computed by the kinds of model {', '.join(_KINDS)}, but --kind is {kind}."
-        )
-    models, table = _figures(path, mechanism, _KINDS if kind == "all" else (kind,))
-    chief = next(iter(models))
-    at_yield_mm = table[chief].get("input_at_yield_mm", _OF_SIZE * mechanism.region.size_mm)
     driven = None if drive is None else np.unique(read_drive(drive, columns).input_mm)
-    touching = models[chief].touch_input_mm().values() if contact and driven is not None else ()
-    inputs = _inputs_mm(driven, at_yield_mm, touching, is_curved=large_rotation or contact)
-    states = {name: [model.state(float(value), large_rotation=large_rotation, contact=contact) for value in inputs]
-              for name, model in models.items()}  # fmt: skip
-    _write_states(states, chief, out)
+    physics = Physics(large_rotation=large_rotation, contact=contact)
+    found = predict_mechanism(path, drawing, kind, driven, physics)
+    models, states, inputs = found.models, found.states, found.input_mm
+    table = {name: dict(row) for name, row in found.figures.items()}
+    say_refusals(found.refusals)
+    chief = next(iter(models))
+    folders = {name: out if name == chief else out / name for name in models}
+    make_out_folder(out)
+    for name, folder in folders.items():
+        found.write(name, folder)
     plate = models.get("finite_element")
     if isinstance(plate, MechanismPlate):
         shown = max(states["finite_element"], key=lambda state: abs(state.input_mm))
@@ -214,8 +159,9 @@ def predict(
     draw_over_input(mechanism, states, out / "models.png")
     for name, rows in states.items():
         add_endurance(mechanism, rows, table[name])
-    write_figures(table, out / "models.csv")
-    print_figures(mechanism.name, table, as_json=as_json)
+    (out / "models.csv").write_text(figures_csv(table), encoding="utf-8")
+    words = json.dumps(table, indent=2) if as_json else figures_text(mechanism.name, table, digits=6, least=44)
+    click.echo(words)
     if not as_json:
         say_drawing(mechanism)
     if drawing.estimates:
@@ -223,7 +169,6 @@ def predict(
         write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)
     bent = (large_rotation or contact) and asked.drive is not None
     curves = {name: _curve(states[name]) for name in models if bent}
-    folders = {name: out if name == chief else out / name for name in models}
     if chief != "stiffness_matrix":
         move(models, asked, mechanism.name, folders, out, static=curves, as_json=as_json)
     elif asked.moves:
@@ -236,83 +181,15 @@ def predict(
         write_pair_grip(models, gripped, None if drive is None else inputs, out, as_json=as_json)
     if not as_json:
         say_endurance(chief, mechanism, states[chief])
-    warn(mechanism, models[chief], states[chief], table, contact=contact)
+    warn(mechanism, models[chief], states[chief], table[chief].get("input_at_yield_mm", np.nan), contact=contact)
+    for sentence in found.warnings:
+        click.echo(f"Warning: {sentence}", err=True)
 
 
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Add the name of the drawing's file to the message of an error that is raised in the `with` block."""
-    try:
-        yield
-    except FingervisionError as error:
-        if str(path) in str(error) or isinstance(error, ArgumentError | InstallationError):
-            raise
-        raise type(error)(f"In {path}: {error}") from error
-
-
-def _write_states(states: dict[str, list[MechanismState]], chief: str, out: Path) -> None:
-    """Write the tables of every kind: the chief one's into the folder itself, the others' into folders of their own."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"--out must be a folder that can be written, but {out}: {error.strerror}.") from error
-    for name, rows in states.items():
-        folder = out if name == chief else out / name
-        folder.mkdir(exist_ok=True)
-        write_states(rows, folder)
-
-
-def _figures(
-    path: Path, mechanism: Mechanism, kinds: tuple[str, ...]
-) -> tuple[dict[str, MechanismModel], dict[str, dict[str, float]]]:
-    """Models of several kinds with their figures; if one of several kinds fails, the others are still computed."""
-    models: dict[str, MechanismModel] = {}
-    table: dict[str, dict[str, float]] = {}
-    refusals: dict[str, FingervisionError] = {}
-    for name in kinds:
-        try:
-            with _naming(path):
-                model = _built(name, mechanism)
-                table[name] = mechanism_figures(model)
-        except FingervisionError as error:
-            refusals[name] = error
-        else:
-            models[name] = model
-    if not models:
-        raise next(iter(refusals.values()))
-    for name, refusal in refusals.items():
-        click.echo(f"{name} could not be computed: {refusal}", err=True)
-    return models, table
-
-
-def _inputs_mm(
-    driven: NDArray[np.float64] | None, at_yield_mm: float, touching: Iterable[float], *, is_curved: bool
-) -> NDArray[np.float64]:
-    """Inputs of the static table (mm): those of the drive table, or enough evenly spaced inputs for a smooth curve."""
-    if driven is None:
-        return np.linspace(-_OF_YIELD, _OF_YIELD, _ROWS) * at_yield_mm
-    if driven.size < 2:
-        raise UsageError(f"--drive must hold at least two different inputs, but holds {driven.size}.")
-    inputs = driven if driven.size <= _MOST_ROWS else np.linspace(driven[0], driven[-1], _MOST_ROWS)
-    if not is_curved:
-        return inputs
-    # A table is interpolated linearly between its rows, but these results are curved.
-    touches = [at for at in touching if inputs[0] < at < inputs[-1]]
-    return np.union1d(inputs, np.concatenate([np.linspace(inputs[0], inputs[-1], _ROWS), touches]))
-
-
-def _curve(states: list[MechanismState]) -> PchipInterpolator:
+def _curve(states: Sequence[MechanismState]) -> PchipInterpolator:
     """Lengths and force over the input, in the column order of the dynamic response; contacts may cause kinks."""
     rows = [
         [*state.pairs_mm.values(), *(part for probe in state.probes_mm.values() for part in probe), state.force_n]
         for state in states
     ]
     return PchipInterpolator([state.input_mm for state in states], rows)
-
-
-def _built(name: str, mechanism: Mechanism) -> MechanismModel:
-    if name == "finite_element":
-        return MechanismPlate(mechanism)
-    if name == "lumped":
-        return MechanismFrame(mechanism)
-    return MechanismChain(mechanism)

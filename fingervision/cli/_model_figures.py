@@ -10,7 +10,6 @@ from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
 from fingervision.cli._body_picture import draw_body, extent_mm, framed
-from fingervision.domain.response import Response
 from fingervision.models import reference_mesh
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.triangulate import PlaneMesh
@@ -64,9 +63,7 @@ def draw_mesh(mesh: PlaneMesh, name: str, path: Path) -> None:
     figure.savefig(path, dpi=200)
 
 
-def draw_comparison(
-    inputs: Array, answers: Mapping[str, Response], name: str, path: Path, *, with_published: bool
-) -> None:
+def draw_comparison(tables: Mapping[str, Mapping[str, Array]], name: str, path: Path, *, with_published: bool) -> None:
     """Plot the gap over the input for every model, and the differences between models below.
 
     For the published gripper, the published results are also plotted, and the differences are taken from the published
@@ -75,15 +72,16 @@ def draw_comparison(
     figure = Figure(figsize=(8.0, 7.5), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     colours = mpl.colormaps["tab10"]
-    kinds = list(answers)
+    kinds = list(tables)
+    inputs = tables[kinds[0]]["input_mm"]
     if with_published:
         at, reference = reference_mesh.INPUT_MM, reference_mesh.EXPERIMENT_MM
         title = "gap minus experiment / mm"
     else:
-        at, reference = inputs, answers[kinds[0]].gap_mm
+        at, reference = inputs, tables[kinds[0]]["gap_mm"]
         title = f"gap minus {kinds[0]} / mm"
     for place, kind in enumerate(kinds):
-        gap = answers[kind].gap_mm
+        gap = tables[kind]["gap_mm"]
         upper.plot(inputs, gap, color=colours(place), linestyle=("-", "--", "-.")[place % 3], label=kind)
         inside = (at >= inputs.min() - 1e-9) & (at <= inputs.max() + 1e-9)
         difference = np.interp(at[inside], inputs, gap) - reference[inside]

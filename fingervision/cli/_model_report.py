@@ -1,7 +1,6 @@
-"""Table of results of the `model` command, and warnings about the limits of these results."""
+"""Warnings about the limits of the results of the `model` command."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import click
@@ -10,38 +9,10 @@ from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import ModelFigures
-from fingervision.models.gripper_figures import input_at_yield_mm, life_between, unit_of
+from fingervision.models.gripper_figures import input_at_yield_mm, life_between
 from fingervision.models.kinds import by_trust, small_displacements_alone
 from fingervision.models.notch import notches_of
 from fingervision.models.physics import Physics
-
-
-def write_table(rows: Mapping[str, Mapping[str, Any]], path: Path) -> None:
-    """Write models.csv: one line per kind of model, with empty cells for results that a kind does not compute."""
-    names = list(next(iter(rows.values())))
-    lines = [",".join(["kind", *names])]
-    lines += [",".join([kind, *(_cell(row[name]) for name in names)]) for kind, row in rows.items()]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _cell(value: float | None) -> str:
-    return "" if value is None else f"{value:.7g}"
-
-
-def print_table(rows: Mapping[str, Mapping[str, Any]], *, as_json: bool) -> None:
-    """Print the table of results: one row per quantity, one column per kind of model."""
-    import json
-
-    if as_json:
-        click.echo(json.dumps(rows, indent=2))
-        return
-    names = list(next(iter(rows.values())))
-    labels = {name: f"{name} [{unit_of(name)}]" for name in names}
-    width = max(len(label) for label in labels.values())
-    click.echo(" " * width + "".join(f"{kind:>18}" for kind in rows))
-    for name in names:
-        cells = ("-" if row[name] is None else f"{row[name]:.5g}" for row in rows.values())
-        click.echo(f"{labels[name]:<{width}}" + "".join(f"{cell:>18}" for cell in cells))
 
 
 def say_what_limits(

@@ -182,10 +182,38 @@ models_option = option(
     "--model", "model_paths", required=True, multiple=True, type=MODEL_FILE, group=MODEL,
     help=f"{MODEL_WORDS}; several are compared in one figure.",
 )  # fmt: skip
+title_option = option("--title", default="", metavar="WORDS", group=OUTPUT, help="Title of page and plots.")
+names_option = option(
+    "--name", "names", multiple=True, metavar="MODEL=WORDS", group=OUTPUT,
+    help="Name of a model in the legends of the plots; repeatable.",
+)  # fmt: skip
+
+
+def names_of(models: Sequence[Path], names: Sequence[str]) -> dict[Path, str]:
+    """Interpret `--name`; a model is named as after `--model`, or by its file's name alone."""
+    found: dict[Path, str] = {}
+    for words in names:
+        by_model = {model: words.removeprefix(f"{known}=") for model in models for known in (str(model), model.name)
+                    if words.startswith(f"{known}=")}  # fmt: skip
+        if len(by_model) != 1 or not all(by_model.values()):
+            raise UsageError(
+                f"--name must be MODEL=WORDS with one of the models ({', '.join(map(str, models))}), but is {words}."
+            )
+        found |= by_model
+    return found
+
+
 kind_option = option(
     "--kind", type=KindName(), default="lumped", show_default=True, group=MODEL,
     help="Kind of model by which a gripper.toml is computed.",
 )  # fmt: skip
+
+
+def complete_effect(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Complete the name of an effect for the shell."""
+    from fingervision.effects import catalogue
+
+    return [name for name in catalogue() if name.startswith(incomplete)]
 
 
 def effects_option(command: Function) -> Function:
@@ -211,7 +239,8 @@ bed_option = option(
     help="The test bed: the word simulated, or its configuration file (bed.toml, see File formats in the manual).",
 )  # fmt: skip
 hide_option = option(
-    "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]|SEALED.toml", group=BED,
+    "--hide", multiple=True, metavar="EFFECT[:PARAMETER=VALUE,...]|SEALED.toml", shell_complete=complete_effect,
+    group=BED,
     help="Hide an effect of the catalogue in the simulated parts: measurement and diagnosis do not know it; "
     "repeatable.",
 )  # fmt: skip

@@ -1,6 +1,6 @@
 """`fingervision batch`: measure or diagnose many inputs, on all cores of this computer or on a Dask cluster."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from copy import copy
 from io import StringIO
@@ -18,6 +18,7 @@ from fingervision.domain.errors import ExitCode, FingervisionError, InputFileErr
 if TYPE_CHECKING:
     from fingervision.batch.run import Batch, Plan, Row
     from fingervision.batch.task import Perform
+    from fingervision.interface.progress import Bar
 
 EXAMPLES = """
 \b
@@ -64,7 +65,7 @@ def command() -> None:
     """Run one command on many inputs, with a result folder for each input and an overview of all results."""
 
 
-def _options_of(name: str) -> list[click.Option]:
+def options_of(name: str) -> list[click.Option]:
     """Options of the single command that a batch takes too; what that command requires may stand in a list."""
     single = cli.get_command(click.Context(cli), name)
     assert single is not None  # noqa: S101 - named below
@@ -90,7 +91,7 @@ def _if_stated(callback: Callable[..., Any] | None) -> Callable[..., Any]:
 
 def _batch_of(name: str) -> click.Command:
     """Make a batch command that has the options of the single command and those of a batch."""
-    options = _options_of(name)
+    options = options_of(name)
 
     def callback(**chosen: Any) -> None:
         context = click.get_current_context()
@@ -99,7 +100,11 @@ def _batch_of(name: str) -> click.Command:
             for option in options
             if context.get_parameter_source(str(option.name)) is not click.core.ParameterSource.DEFAULT
         }
-        _run(name, options, given, **{"results": None, **{key: chosen[key] for key in OWN if key in chosen}})
+        chosen = {"results": None, **{key: chosen[key] for key in OWN if key in chosen}}
+        as_json = chosen.pop("as_json")
+        plan, batch = run_batch(name, given, **chosen, progress=True)
+        _report(plan, batch, as_json)
+        raise SystemExit(int(batch.exit_code))
 
     def of_batch(*declared: str, group: str = BATCH, **settings: Any) -> Option:
         return Option(declared, group=group, **settings)
@@ -170,9 +175,8 @@ def _is_for_want_of_room(error: BaseException | None) -> bool:
     return False
 
 
-def _run(
+def run_batch(
     name: str,
-    options: Sequence[click.Option],
     given: Mapping[click.Option, Any],
     inputs: tuple[str, ...],
     list_file: Path | None,
@@ -180,14 +184,33 @@ def _run(
     out: Path,
     scheduler: str | None,
     jobs: int | None,
-    as_json: bool,
-) -> None:
+    progress: "Bar | bool | None",
+) -> tuple["Plan", "Batch"]:
+    """Run a command on many inputs; the command line and `fingervision.batch` call this function.
+
+    Parameters
+    ----------
+    name : str
+        `measure` or `diagnose`.
+    given : mapping of click.Option to object
+        Options of the command (`options_of`) that are stated, with their values.
+    inputs, list_file, results, out, scheduler, jobs
+        The options of `fingervision batch`.
+    progress : callable, bool or None
+        As in `fingervision.measure`.
+
+    Raises
+    ------
+    FingervisionError
+        The request makes no sense, nothing matches, or the results cannot be written.
+    """
     from contextlib import ExitStack
     from functools import partial
 
     from fingervision.batch import cluster
     from fingervision.batch.local_processes import LocalCrew, cores
     from fingervision.batch.run import Crew, Job, planned, run
+    from fingervision.interface.progress import shown
 
     if scheduler is not None and jobs is not None:
         raise UsageError(
@@ -200,7 +223,7 @@ def _run(
             "the command."
         )
     is_far = scheduler is not None
-    rows = () if list_file is None else _rows_of(list_file, name, options, given, results, is_far=is_far)
+    rows = () if list_file is None else _rows_of(list_file, name, given, results, is_far=is_far)
     arguments = tuple(_arguments(given, absolute=is_far))
     plan = planned(Job(name, inputs, arguments, "" if rows else _options_key(name, given), out, rows))
     with ExitStack() as stack:
@@ -214,16 +237,13 @@ def _run(
             if not rows:
                 _check_options(name, arguments, perform)
             crew = partial(cluster.outcomes_of, stack.enter_context(cluster.connected(scheduler)), perform=perform)
-        show = stack.enter_context(_Bar(name, len(plan.to_do)))
-        batch = run(plan, crew, show)
-    _report(plan, batch, as_json)
-    raise SystemExit(int(batch.exit_code))
+        show = stack.enter_context(shown(progress, f"Batch {name}", "inputs"))
+        return plan, run(plan, crew, show)
 
 
 def _rows_of(
     path: Path,
     name: str,
-    options: Sequence[click.Option],
     given: Mapping[click.Option, Any],
     results: Path | None,
     *,
@@ -233,9 +253,9 @@ def _rows_of(
     from fingervision.batch.run import Row
     from fingervision.cli._batch_list import listed_runs
 
-    others = [option for other in COMMANDS if other != name for option in _options_of(other)]
+    others = [option for other in COMMANDS if other != name for option in options_of(other)]
     rows = []
-    for each in listed_runs(path, name, options, others, results):
+    for each in listed_runs(path, name, options_of(name), others, results):
         stated = {**given, **each.options}
         rows.append(Row(each.input, tuple(_arguments(stated, absolute=is_far)), _options_key(name, stated)))
     return tuple(rows)
@@ -306,38 +326,6 @@ def _check_options(name: str, arguments: tuple[str, ...], ask: "Perform") -> Non
     if nowhere not in ended.words:
         kind = UsageError if ended.exit_code == ExitCode.WRONG_USAGE else FingervisionError
         raise kind(ended.words)
-
-
-class _Bar:
-    """Progress bar with rate and remaining time, shown on a terminal only."""
-
-    def __init__(self, name: str, total: int) -> None:
-        import sys
-        from time import monotonic
-
-        self._clock: Callable[[], float] = monotonic
-        self._bar = click.progressbar(
-            length=total,
-            label=f"batch {name}",
-            file=sys.stderr,
-            show_pos=True,
-            show_eta=True,
-            hidden=not (total and sys.stderr.isatty()),
-            item_show_func=lambda rate: rate,
-        )
-
-    def __enter__(self) -> Callable[[int, int], None]:
-        self._started_s = self._clock()
-        self._bar.__enter__()
-        return self._show
-
-    def __exit__(self, *ended: Any) -> None:
-        self._bar.__exit__(*ended)
-
-    def _show(self, done: int, _of: int) -> None:
-        rate = done / max(1e-9, self._clock() - self._started_s)
-        words = f"{rate:.1f} a second" if rate >= 1.0 else f"{60.0 * rate:.1f} a minute"
-        self._bar.update(done - self._bar.pos, words)
 
 
 def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:

@@ -1,6 +1,5 @@
 """`fingervision bed`: commands of the test bed: run and check recipes, move the stage by hand."""
 
-from contextlib import closing
 from pathlib import Path
 
 import click
@@ -146,32 +145,13 @@ def run(
     The whole recipe is checked against the limits of the test bed before anything moves.
     """
     import json
-    import sys
 
-    from fingervision.measuring.rehearsal import rehearse
+    from fingervision.interface.bed import bed as opened
     from fingervision.storage.recipe_toml import read_recipe
-    from fingervision.testbed.bed_factory import open_bed
-    from fingervision.testbed.run.recipe_run import run_recipe
-    from fingervision.testbed.run.run_folder import rows_before, times_of
-    from fingervision.testbed.simulation.parse_injected_effects import hidden_from
 
-    recipe, hidden = read_recipe(recipe_toml), hidden_from(hide)
-    before = [] if after is None else rows_before(after)
-    rehearse()
-    pace = 1.0 if real_time else 0.0
-    with (
-        closing(open_bed(bed_name, hidden, pace=pace, seed=seed, earlier_s=times_of(before))) as bed,
-        click.progressbar(length=1000, label="running", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar,
-    ):
-        done = run_recipe(
-            recipe,
-            bed,
-            out,
-            hidden,
-            before=before,
-            on_progress=lambda now, total: bar.update(max(0, int(1000 * now / total) - bar.pos) if total else 0),
-            say=lambda words: click.echo(words, err=True),
-        )
+    recipe = read_recipe(recipe_toml)
+    with opened(bed_name, hide=hide, seed=seed, real_time=real_time, after=after) as bed:
+        done = bed.run(recipe, out, progress=True, say=lambda words: click.echo(words, err=True))
     if as_json:
         counts = done.counts
         document = {"folder": str(done.folder), "frames": counts.recorded, "frames_with_gap": counts.with_gap}
@@ -179,9 +159,8 @@ def run(
         return
     went_on = f", after {done.resumed_after} recorded before the interruption" if done.resumed_after else ""
     click.echo(f"{done.counts.recorded} frames{went_on}, {done.counts.with_gap} with a gap: {out / 'samples.csv'}")
-    if bed.model is not None:
-        table = out / ("samples.csv" if after is None else "joined.csv")
-        click.echo(f"next: fingervision diagnose {table} --model {out / 'simulation.csv'} --out diagnosis")
+    if bed.bed.model is not None:
+        click.echo(f"next: fingervision diagnose {done.table} --model {out / 'simulation.csv'} --out diagnosis")
 
 
 @command.command("check", epilog=CHECK_EXAMPLES)
@@ -269,13 +248,12 @@ def move(to_mm: float, speed_mm_s: float, home_first: bool, bed_name: str) -> No
 
     Nothing moves if the target is beyond the limits of the test bed.
     """
-    from fingervision.testbed.bed_factory import open_bed
-    from fingervision.testbed.manual import manual_control
+    from fingervision.interface.bed import bed as opened
 
-    with closing(open_bed(bed_name)) as bed:
+    with opened(bed_name) as bed:
         if home_first:
-            manual_control.home(bed)
-        click.echo(f"moved: {manual_control.move(bed, to_mm, speed_mm_s):.3f} mm")
+            bed.home()
+        click.echo(f"moved: {bed.move(to_mm, speed_mm_s):.3f} mm")
 
 
 @command.command("jog", epilog=JOG_EXAMPLES, context_settings={"ignore_unknown_options": True})
@@ -290,13 +268,12 @@ def jog(speed_mm_s: float, seconds: float | None, home_first: bool, bed_name: st
     """
     from math import inf
 
-    from fingervision.testbed.bed_factory import open_bed
-    from fingervision.testbed.manual import manual_control
+    from fingervision.interface.bed import bed as opened
 
-    with closing(open_bed(bed_name, pace=1.0)) as bed:
+    with opened(bed_name, real_time=True) as bed:
         if home_first:
-            manual_control.home(bed)
-        click.echo(f"jogged: {manual_control.jog(bed, speed_mm_s, inf if seconds is None else seconds):.3f} mm")
+            bed.home()
+        click.echo(f"jogged: {bed.jog(speed_mm_s, inf if seconds is None else seconds):.3f} mm")
 
 
 @command.command("steps", epilog=STEPS_EXAMPLES)
@@ -335,11 +312,10 @@ def home(bed_name: str) -> None:
 
     This also resets an earlier motor stop.
     """
-    from fingervision.testbed.bed_factory import open_bed
-    from fingervision.testbed.manual import manual_control
+    from fingervision.interface.bed import bed as opened
 
-    with closing(open_bed(bed_name)) as bed:
-        click.echo(f"homed: {manual_control.home(bed):.3f} mm")
+    with opened(bed_name) as bed:
+        click.echo(f"homed: {bed.home():.3f} mm")
 
 
 @command.command("stop", epilog=STOP_EXAMPLES)

@@ -7,14 +7,18 @@ import click
 from fingervision.cli._command import FILE, MODEL, make_command, option
 from fingervision.cli._options import (
     columns_option,
+    complete_effect,
     effects_option,
     json_option,
     kind_option,
     model_option,
+    names_of,
+    names_option,
     out_option,
     results_folder,
     running_command,
     seed_option,
+    title_option,
 )
 
 EXAMPLES = """
@@ -30,7 +34,7 @@ Examples:
 Files written to --out:
   report.html   the result on one page       report.json   the same as data
   model.toml    the corrected model          next_run.toml recipe of a run that separates what is ambiguous
-  gap_against_input, gap_over_time, residuals: plots as .svg and .pdf
+  gap_against_input (170 mm wide), gap_against_input_85mm, gap_over_time, residuals: plots for a paper as .svg and .pdf
 With --reference, instead of these:
   changes.json   what changed, and where         changes.svg   the drawing, coloured by the evidence
 """
@@ -47,12 +51,27 @@ With --reference, instead of these:
     help="Table of the same specimen while it was healthy: say what changed since, and at which hinge.",
 )
 @option(
-    "--with", "forced", multiple=True, metavar="EFFECT", group=MODEL, help="Include this effect in every explanation."
+    "--with",
+    "forced",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=complete_effect,
+    group=MODEL,
+    help="Include this effect in every explanation.",
 )
-@option("--without", multiple=True, metavar="EFFECT", group=MODEL, help="Exclude this effect from every explanation.")
+@option(
+    "--without",
+    multiple=True,
+    metavar="EFFECT",
+    shell_complete=complete_effect,
+    group=MODEL,
+    help="Exclude this effect from every explanation.",
+)
 @effects_option
 @columns_option
 @out_option("diagnosis")
+@title_option
+@names_option
 @json_option("Print report.json.")
 @seed_option("Seed of the bootstrap; the same seed gives the same report.")
 def command(
@@ -65,6 +84,8 @@ def command(
     seed: int,
     kind: str,
     columns: Path | None,
+    title: str,
+    names: tuple[str, ...],
     as_json: bool,
 ) -> None:
     """Identify the physical effect that a model lacks, by comparing the model with a measured table."""
@@ -92,7 +113,7 @@ def command(
             progress=True,
             call=running_command(),
         )
-    document = done.write(out)
+    document = done.write(out, title, names_of([model_path], names).get(model_path, ""))
     click.echo(json.dumps(document, indent=2) if as_json else f"{done.sentences()}\n  {out / PAGE}")
 
 
@@ -102,7 +123,7 @@ def _changes(
     """Compare with a healthy recording, and print what changed."""
     import json
 
-    from fingervision.interface.diagnosis import CHANGES, changes_since
+    from fingervision.interface.healthy_reference import CHANGES, changes_since
     from fingervision.storage.out_folder import new_out_folder
 
     out = results_folder(out, measured)

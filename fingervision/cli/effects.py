@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from fingervision.cli._command import make_command
-from fingervision.cli._options import effects_option, figure_option
+from fingervision.cli._options import complete_effect, effects_option, figure_option
 from fingervision.domain.errors import UsageError
 
 EXAMPLES = """
@@ -18,7 +18,7 @@ Examples:
 
 
 @make_command(EXAMPLES)
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=complete_effect)
 @effects_option
 @figure_option("Plot the residual that the effect causes.")
 def command(name: str | None, figure: Path | None) -> None:
@@ -63,7 +63,8 @@ def command(name: str | None, figure: Path | None) -> None:
     for p in effect.parameters:
         click.echo(f"  {p.words}: {p.name}, {p.unit or 'ratio'}, {p.lower:g} to {p.upper:g}, narrowed by the data")
     if figure is not None:
-        from fingervision.diagnosis.report.figure_files import effect_figure, png_bytes
+        from fingervision.diagnosis.report.figure_files import effect_figure
+        from fingervision.diagnosis.report.vector_figure import png_bytes
 
         figure.write_bytes(png_bytes(effect_figure(name)))
         click.echo(f"  picture   {figure}")

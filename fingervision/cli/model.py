@@ -1,8 +1,7 @@
 """`fingervision model`: predict the behaviour of a gripper or mechanism from its drawing."""
 
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,12 +9,8 @@ from fingervision.cli._command import CLOCK, FILE, MODEL, NUMBER, OUTPUT, KindNa
 from fingervision.cli._options import columns_option, json_option, out_option, results_folder
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from fingervision.domain.gripper import Gripper
-    from fingervision.domain.response import Response
-    from fingervision.models.answer_figures import ModelFigures
+    from fingervision.interface.prediction import GripperPrediction
 
 _SWEPT = ("vary.csv", "vary.png", "solve.csv")
 _PREDICTED = (
@@ -173,19 +168,22 @@ def command(
     response.csv (gap and force over the drive's time, a table that compare and diagnose accept as measured) and
     response.png. For a mechanism.toml, the results over the input are in mechanism.csv.
     """
+    import json
+
+    import numpy as np
+
+    from fingervision.cli._mechanism_report import say_refusals
     from fingervision.cli._model_grip import part_asked, write_grip
-    from fingervision.cli._model_inputs import inputs_mm, inputs_until_touch, with_rows_between
     from fingervision.cli._model_motion import motion_asked, move
-    from fingervision.cli._model_report import print_table, say_what_limits, write_table
-    from fingervision.domain.errors import FingervisionError
-    from fingervision.models.gripper_figures import gripper_figures
+    from fingervision.cli._model_report import say_what_limits
+    from fingervision.interface.prediction import figures_csv, figures_text, predict_gripper
     from fingervision.models.hinge_correction import HingeTheory
-    from fingervision.models.kinds import build_model, disagreements, kinds, small_displacements_alone
-    from fingervision.models.physics import LINEAR, Physics
+    from fingervision.models.kinds import kinds
+    from fingervision.models.physics import Physics
     from fingervision.storage.gripper_toml import read_gripper
     from fingervision.storage.mechanism_toml import is_mechanism
-    from fingervision.storage.out_folder import began_in, finish_in
-    from fingervision.storage.simulation_table import write_simulation
+    from fingervision.storage.out_folder import began_in, finish_in, make_out_folder
+    from fingervision.tables.read import read_drive
 
     asked = motion_asked(drive, columns, modes, frequency, damping, rate_hz, film=film)
     out = results_folder(out, gripper_toml)
@@ -218,56 +216,24 @@ def command(
         from fingervision.models.uncertainty import check_uncertainties
 
         check_uncertainties(gripper)
-    wanted = kinds() if kind == "all" else (kind,)
     physics = Physics(large_rotation=large_rotation, contact=contact)
-    inputs = None if drive is None else inputs_mm(drive, columns, gripper)
-    _make_folder(out)
-    rows: dict[str, dict[str, Any]] = {}
-    answers: dict[str, Response] = {}
-    figures: dict[str, ModelFigures] = {}
-    models: dict[str, Any] = {}
-    refusals: dict[str, FingervisionError] = {}
-    for name in wanted:
-        began = time.perf_counter()
-        own = LINEAR if kind == "all" and small_displacements_alone(name) else physics
-        try:
-            model = build_model(name, gripper, own, HingeTheory(hinge))
-            figures[name] = model.figures()
-            given = inputs
-            if given is None:
-                given = inputs_until_touch(figures[name])
-            elif physics != LINEAR and not models:
-                given = with_rows_between(given, figures[name])
-            answers[name] = model.respond(given)
-            row = gripper_figures(gripper, model, given, figures[name])
-        except FingervisionError as error:
-            # If one kind of model fails, the results of the other kinds are still written.
-            figures.pop(name, None)
-            answers.pop(name, None)
-            if kind != "all":
-                raise
-            refusals[name] = error
-            click.echo(f"{name} could not be computed: {error}", err=True)
-            continue
-        inputs, models[name] = given, model
-        rows[name] = {**row, "seconds": round(time.perf_counter() - began, 3)}
-        folder = out / name if kind == "all" else out
-        folder.mkdir(exist_ok=True)
-        # A model from a plug-in need not provide the position of each body.
-        poses = model.body_poses(inputs) if hasattr(model, "body_poses") else {}
-        write_simulation(folder / "simulation.csv", inputs, answers[name], poses)
-    if inputs is None or not rows:
-        raise next(iter(refusals.values()))
-    _draw(gripper_toml.stem, gripper, inputs, models, answers, out, mesh=mesh)
-    write_table(rows, out / "models.csv")
-    print_table(rows, as_json=as_json)
+    inputs = None if drive is None else np.unique(read_drive(drive, columns).input_mm)
+    make_out_folder(out)
+    found = predict_gripper(gripper_toml, gripper, kind, inputs, physics, HingeTheory(hinge))
+    models, rows, figures, inputs = found.models, found.figures, found.stated, found.input_mm
+    folders = {name: out / name if kind == "all" else out for name in models}
+    say_refusals(found.refusals)
+    for name, folder in folders.items():
+        found.write(name, folder)
+    _draw(gripper_toml.stem, gripper, found, out, mesh=mesh)
+    (out / "models.csv").write_text(figures_csv(rows), encoding="utf-8")
+    click.echo(json.dumps(rows, indent=2) if as_json else figures_text("", rows))
     if uncertain:
         from fingervision.cli._model_uncertainty import write_uncertainty
         from fingervision.models.uncertainty import gripper_uncertainty
 
         spread = gripper_uncertainty(gripper, inputs, HingeTheory(hinge), physics)
         write_uncertainty(spread, rows, gripper_toml.stem, out, as_json=as_json)
-    folders = {name: out / name if kind == "all" else out for name in models}
     move(models, asked, gripper_toml.stem, folders, out, as_json=as_json)
     if part is not None:
         given_inputs = None if drive is None else inputs
@@ -279,38 +245,20 @@ def command(
         (*_PREDICTED, *(f"{each}/{name}.csv" for each in kinds() for name in ("simulation", "response"))),
         began_ns,
     )
-    for sentence in disagreements(figures):
+    for sentence in found.warnings:
         click.echo(f"Warning: {sentence}", err=True)
     say_what_limits(gripper, models, figures, inputs, physics, as_json=as_json)
 
 
-def _make_folder(out: Path) -> None:
-    from fingervision.domain.errors import OutputError
-
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"--out must be a folder that can be written, but {out} is not: {error.strerror}.") from error
-
-
-def _draw(
-    name: str,
-    gripper: "Gripper",
-    inputs: "NDArray[np.float64]",
-    models: dict[str, Any],
-    answers: "dict[str, Response]",
-    out: Path,
-    *,
-    mesh: bool,
-) -> None:
+def _draw(name: str, gripper: "Gripper", found: "GripperPrediction", out: Path, *, mesh: bool) -> None:
     from fingervision.cli._model_figures import draw_comparison, draw_deformed, draw_mesh
     from fingervision.models.reference_mesh import is_reference
 
-    model = next((model for model in models.values() if hasattr(model, "mesh")), None)
+    model = next((model for model in found.models.values() if hasattr(model, "mesh")), None)
     if model is not None:
-        draw_deformed(model, float(inputs[abs(inputs).argmax()]), name, out / "deformed.png")
+        draw_deformed(model, float(found.input_mm[abs(found.input_mm).argmax()]), name, out / "deformed.png")
         if mesh:
             draw_mesh(model.mesh, name, out / "mesh.png")
     elif mesh:
         click.echo("--mesh draws the mesh of the finite elements: add --kind finite_element.", err=True)
-    draw_comparison(inputs, answers, name, out / "models.png", with_published=is_reference(gripper))
+    draw_comparison(found.tables, name, out / "models.png", with_published=is_reference(gripper))

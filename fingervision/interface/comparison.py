@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from fingervision.diagnosis.compare import Comparison as OneComparison
 from fingervision.diagnosis.compare import compare as compare_one
-from fingervision.diagnosis.report.comparison_files import comparison_document, residuals_of, write_comparison
+from fingervision.diagnosis.report.comparison_files import (
+    comparison_document,
+    curves_of,
+    left_out_of,
+    residuals_of,
+    write_comparison,
+)
+from fingervision.diagnosis.report.paper_figure import WIDTHS_MM, paper_figure
 from fingervision.domain.report import Place
 from fingervision.interface.argument_checks import speaks_python, whole_number
 from fingervision.interface.notebook import cell_html, save_results
@@ -111,8 +118,19 @@ class Comparison:
         """Draw the residuals of all models, as in compare.png."""
         return residuals_of(self.models)
 
-    def save(self, folder: "str | os.PathLike[str]") -> Path:
+    def gap_figure(self, title: str = "", *, width_mm: float = WIDTHS_MM[""]) -> "Figure":
+        """Draw the gap against the input with the residuals under it, for a paper: 85 or 170 mm wide, 8 point text."""
+        return paper_figure(curves_of(self.models), title, width_mm=width_mm, left_out=left_out_of(self.models))
+
+    def save(self, folder: "str | os.PathLike[str]", title: str = "") -> Path:
         """Write what `fingervision compare --out FOLDER` writes: compare.html, compare.json and the figures.
+
+        Parameters
+        ----------
+        folder : path
+            Folder for the results.
+        title : str
+            Title of page and figures.
 
         Returns
         -------
@@ -126,12 +144,12 @@ class Comparison:
         OutputError
             The folder or a file in it cannot be written.
         """
-        return save_results(self, folder)
+        return save_results(self.measured, folder, lambda out: self.write(out, title))
 
-    def write(self, out: Path) -> None:
+    def write(self, out: Path, title: str = "") -> None:
         """Write the files of the comparison into an existing folder, overwriting earlier ones."""
         with out_folder(out):
-            write_comparison(out, self.models, self.made, self.measured)
+            write_comparison(out, self.models, self.made, self.measured, title)
         mark_owner(out, self.measured)
 
     def __repr__(self) -> str:

@@ -1,6 +1,5 @@
 """`fingervision.diagnose`: name the effect that a model lacks, from a measured table."""
 
-import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.bodies.reference_report import Compared, compare_with_healthy, drawing_svg
 from fingervision.diagnosis.diagnose import Diagnosis as Found
 from fingervision.diagnosis.diagnose import diagnose as diagnose_table
 from fingervision.diagnosis.report.answer_files import corrected, write_answer
 from fingervision.diagnosis.report.figure_files import residual_figure
+from fingervision.diagnosis.report.paper_figure import WIDTHS_MM, paper_figure
+from fingervision.diagnosis.report.report_page import SIMULATION, curves_of
 from fingervision.diagnosis.report.residual_localization import by_channel
 from fingervision.diagnosis.report.sentences import detail_lines
 from fingervision.domain.effect import Effect
@@ -25,7 +25,6 @@ from fingervision.interface.own_effect import added
 from fingervision.interface.progress import shown
 from fingervision.interface.tables import effect_names, measured_given, model_given, own_base
 from fingervision.models.corrected import CorrectedModel
-from fingervision.storage.flexures_csv import flexures_beside
 from fingervision.storage.out_folder import mark_owner, out_folder
 from fingervision.storage.provenance import Provenance, provenance
 
@@ -33,79 +32,6 @@ if TYPE_CHECKING:
     import os
 
     from matplotlib.figure import Figure
-
-
-# Compare a recording with a healthy recording of the same specimen, and write what changed.
-
-
-CHANGES, DRAWING = "changes.json", "changes.svg"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Changes:
-    """What changed since a healthy recording; made by `changes_since`.
-
-    Parameters
-    ----------
-    compared : Compared
-        Result of the comparison.
-    measured : Path
-        Table of the faulty recording.
-    made : Provenance
-        Files with their hashes, versions and time.
-    """
-
-    compared: Compared
-    measured: Path
-    made: Provenance = field(repr=False)
-
-    def sentences(self) -> str:
-        """Return the result in the sentences that the command prints."""
-        return "\n".join(self.compared.sentences())
-
-    def write(self, out: Path) -> dict[str, Any]:
-        """Write changes.json and changes.svg into an existing folder, and return the content of changes.json."""
-        document = {**self.compared.document(), "made": self.made.document()}
-        with out_folder(out):
-            (out / CHANGES).write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-            drawing = drawing_svg(self.compared)
-            if drawing:
-                (out / DRAWING).write_text(drawing, encoding="utf-8")
-        mark_owner(out, self.measured)
-        return document
-
-
-def changes_since(faulty: Path, healthy: Path, model: Path, *, kind: str, columns: Path | None, call: str) -> Changes:
-    """Compare a measured table with a healthy one of the same specimen; write nothing.
-
-    Parameters
-    ----------
-    faulty, healthy : Path
-        Measured tables; the flexures.csv beside each is used where both have one.
-    model : Path
-        The model; with a drawing, the place of a change is told.
-    kind : str
-        Kind of model by which a gripper.toml is computed.
-    columns : Path or None
-        A columns.toml, for tables of other programs.
-    call : str
-        Name of this call in the provenance of the results.
-
-    Raises
-    ------
-    FingervisionError
-        Tables or model cannot be read, or have too few rows.
-    """
-    tables = [measured_given(path, columns) for path in (faulty, healthy)]
-    given = model_given(model, kind, columns)
-    files = {
-        **tables[0].files("measured table", columns),
-        **tables[1].files("healthy table", columns),
-        **given.files("model", columns),
-    }
-    outlines = flexures_beside(healthy), flexures_beside(faulty)
-    found = compare_with_healthy(tables[0].value, tables[1].value, given.value, outlines)
-    return Changes(found, tables[0].path, provenance(files, call))
 
 
 CALL = "fingervision.diagnose(...) in Python"
@@ -190,8 +116,19 @@ class Diagnosis:
             lines.append(f"  next: {report.next_step}")
         return "\n".join(lines)
 
-    def save(self, folder: "str | os.PathLike[str]") -> Path:
+    def gap_figure(self, title: str = "", name: str = SIMULATION, *, width_mm: float = WIDTHS_MM[""]) -> "Figure":
+        """Draw the gap against the input with the residuals under it, for a paper: 85 or 170 mm wide, 8 point text."""
+        return paper_figure(curves_of(self.found, name), title, width_mm=width_mm, left_out=self.found.left_out)
+
+    def save(self, folder: "str | os.PathLike[str]", title: str = "", name: str = SIMULATION) -> Path:
         """Write what `fingervision diagnose --out FOLDER` writes: report.html, report.json, model.toml, figures.
+
+        Parameters
+        ----------
+        folder : path
+            Folder for the results.
+        title, name : str
+            Title of the figures, and the model's name in their legends.
 
         Returns
         -------
@@ -205,13 +142,13 @@ class Diagnosis:
         OutputError
             The folder or a file in it cannot be written.
         """
-        return save_results(self, folder)
+        return save_results(self.measured, folder, lambda out: self.write(out, title, name))
 
-    def write(self, out: Path) -> dict[str, object]:
+    def write(self, out: Path, title: str = "", name: str = "") -> dict[str, object]:
         """Write the files of the diagnosis into an existing folder, and return the content of report.json."""
         with out_folder(out), added(self.own_effects):
             base = own_base(self.model, out, self.found.data.chain.model)
-            document = write_answer(out, self.found, base, self.made, self.measured)
+            document = write_answer(out, self.found, base, self.made, self.measured, title, name or SIMULATION)
         mark_owner(out, self.measured)
         return document
 
@@ -305,4 +242,4 @@ def diagnose(
     return Diagnosis(found, given.value, table.path, made, own)
 
 
-__all__ = ["CHANGES", "Changes", "Diagnosis", "changes_since", "diagnose"]
+__all__ = ["Diagnosis", "diagnose"]

@@ -1,5 +1,6 @@
 """Runnable examples: the files that the examples of a command's `--help` name, copied into a new folder."""
 
+import os
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,6 +11,7 @@ import numpy as np
 
 import fingervision
 from fingervision.domain.errors import OutputError, UnknownNameError, UsageError
+from fingervision.interface.argument_checks import path_of, speaks_python
 from fingervision.storage.sample_folder import sample_folder
 
 if TYPE_CHECKING:
@@ -302,4 +304,34 @@ def copy_example(name: str, folder: Path) -> Case:
     return case
 
 
-__all__ = ["CASES", "Case", "board_pictures", "copy_example", "exposures", "micrometer", "step_wedge"]
+@speaks_python
+def example(name: str, folder: "str | os.PathLike[str] | None" = None) -> Path:
+    """Copy a runnable example (recordings, tables, drawings) into a new folder, and return the folder.
+
+    Parameters
+    ----------
+    name : str
+        Name of the example, such as measure; `fingervision example` lists them.
+    folder : path or None
+        The new folder; None takes example-NAME.
+
+    Raises
+    ------
+    UnknownNameError
+        No example has that name.
+    OutputError, UsageError
+        The folder is not empty, or cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import fingervision as fv
+    >>> sorted(path.name for path in fv.example("diagnose", tempfile.mkdtemp()).glob("*.csv"))
+    ['comsol.csv', 'healthy.csv', 'samples.csv']
+    """
+    path = Path(f"example-{name}") if folder is None else path_of("folder", folder, "a folder")
+    copy_example(name, path)
+    return path
+
+
+__all__ = ["CASES", "Case", "board_pictures", "copy_example", "example", "exposures", "micrometer", "step_wedge"]

@@ -1,6 +1,7 @@
 """Pictures for a notebook cell, embedded in the page so that the notebook can be sent to others."""
 
 from base64 import b64encode
+from collections.abc import Callable
 from html import escape
 from io import BytesIO
 from pathlib import Path
@@ -44,23 +45,16 @@ def image_html(png: bytes) -> str:
 # Base of results that are saved as the command of the same name saves them, and shown in a notebook cell.
 
 
-class Results(Protocol):
-    """Results from one measured table."""
-
-    @property
-    def measured(self) -> Path:
-        """Path of the measured table, or a name for a table in memory."""
+class Drawn(Protocol):
+    """Results that can be drawn."""
 
     def figure(self) -> "Figure":
         """Draw the residuals."""
 
-    def write(self, out: Path) -> object:
-        """Write the result's files into an existing folder."""
-
 
 @speaks_python
-def save_results(results: Results, folder: "str | os.PathLike[str]") -> Path:
-    """Write the files into a folder, unless it holds the results of another table; return the folder.
+def save_results(measured: Path, folder: "str | os.PathLike[str]", write: Callable[[Path], object]) -> Path:
+    """Write files into a folder, unless it holds the results of another table; return the folder.
 
     Raises
     ------
@@ -69,14 +63,14 @@ def save_results(results: Results, folder: "str | os.PathLike[str]") -> Path:
     OutputError
         The file or folder cannot be written.
     """
-    out = own_folder(path_of("folder", folder, "a folder"), results.measured, named=True)
-    results.write(out)
+    out = own_folder(path_of("folder", folder, "a folder"), measured, named=True)
+    write(out)
     return out
 
 
-def cell_html(results: Results, words: str) -> str:
+def cell_html(results: Drawn, words: str) -> str:
     """Return the HTML of a notebook cell: a text and the figure of the residuals."""
     return f"<pre>{escape(words)}</pre>{image_html(png_of_figure(results.figure()))}"
 
 
-__all__ = ["Results", "cell_html", "image_html", "png_of", "png_of_figure", "save_results"]
+__all__ = ["Drawn", "cell_html", "image_html", "png_of", "png_of_figure", "save_results"]

@@ -1,6 +1,7 @@
 """`fingervision.simulate`: the response of a model, with its effects, to a drive."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from html import escape
 from itertools import pairwise
 from pathlib import Path
@@ -18,13 +19,15 @@ from fingervision.domain.errors import (
     ArgumentTypeError,
     MissingLibraryError,
     OutputError,
+    UnknownNameError,
 )
+from fingervision.domain.parameter import Estimate
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
 from fingervision.frames.array_levels import what_it_is
 from fingervision.interface.argument_checks import path_of, speaks_python
 from fingervision.interface.notebook import image_html, png_of_figure
-from fingervision.interface.tables import model_given
+from fingervision.interface.tables import effect_names, model_given
 from fingervision.models.function_model import FunctionModel
 
 if TYPE_CHECKING:
@@ -187,6 +190,7 @@ def simulate(
     model: "str | os.PathLike[str] | CorrectedModel | Any",
     drive: "str | os.PathLike[str] | DriveHistory | ArrayLike | Any",
     *,
+    effects: Mapping[str, Mapping[str, float]] | None = None,
     kind: str = "lumped",
     columns: "str | os.PathLike[str] | None" = None,
 ) -> Simulation:
@@ -199,6 +203,8 @@ def simulate(
         of times (s) and inputs (mm), see `fingervision.diagnose`.
     drive : path, DriveHistory, DataFrame or mapping with time_s and input_mm, or inputs in mm of shape (n,)
         The input over time. An array of inputs has no times, but a model with effects that have memory needs times.
+    effects : mapping of str to mapping of str to float, or None
+        Effects that are added to the model, each with the values of its parameters.
     kind : str
         Kind of model by which a gripper.toml is computed: stiffness_matrix, lumped or finite_element.
     columns : path or None
@@ -222,9 +228,13 @@ def simulate(
     >>> table = {"input_mm": [0.0, 1.0], "gap_mm": [1.0, 3.0]}
     >>> fv.simulate(table, [0.0, 0.25, 0.5]).gap_mm
     array([1. , 1.5, 2. ])
+    >>> fv.simulate(table, [0.0, 0.25, 0.5], effects={"input_offset": {"offset_mm": 0.1}}).gap_mm
+    array([1.2, 1.7, 2.2])
     """
     given: CorrectedModel = model_given(model, kind, columns).value
-    time_s, input_mm, run = _inputs(drive, columns)
+    if effects:
+        given = replace(given, effects={**given.effects, **_stated(effects)})
+    time_s, input_mm, run = inputs_given(drive, columns)
     low, high = given.input_range_mm
     slack = SLACK * (high - low) if np.isfinite(high - low) else 0.0
     if input_mm.min() < low - slack or input_mm.max() > high + slack:
@@ -260,10 +270,26 @@ def simulate(
     return Simulation(given.name, input_mm, time_s, run, chain.respond({}))
 
 
-def _inputs(drive: Any, columns: Any) -> tuple[NDArray[np.float64] | None, NDArray[np.float64], tuple[str, ...] | None]:
+def _stated(effects: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, Estimate]]:
+    """Check the parameters of effects; those that are not stated have their neutral values."""
+    found = {}
+    for name in effect_names("effects", effects):
+        parameters = {parameter.name: parameter for parameter in catalogue()[name].parameters}
+        for key in effects[name]:
+            if key not in parameters:
+                raise UnknownNameError("effects", key, parameters, f"parameters of {name}")
+        values = {key: effects[name].get(key, each.neutral) for key, each in parameters.items()}
+        if lacking := [key for key, value in values.items() if value is None]:
+            raise ArgumentError("effects", f"state {' and '.join(lacking)} of {name}", "does not")
+        found[name] = {key: Estimate(float(value), None) for key, value in values.items() if value is not None}
+    return found
+
+
+def inputs_given(
+    drive: Any, columns: Any
+) -> tuple[NDArray[np.float64] | None, NDArray[np.float64], tuple[str, ...] | None]:
     """Times, inputs and runs of a drive of any accepted type."""
     import os
-    from collections.abc import Mapping
 
     from fingervision.interface.column_tables import drive_from_columns
     from fingervision.interface.tables import read_table
@@ -292,4 +318,4 @@ def _runs(run: tuple[str, ...] | None, count: int) -> tuple[slice, ...]:
     return tuple(slice(a, b) for a, b in pairwise(borders))
 
 
-__all__ = ["Simulation", "simulate"]
+__all__ = ["Simulation", "inputs_given", "simulate"]

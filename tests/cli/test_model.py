@@ -88,7 +88,7 @@ def test_the_stiffness_matrix_knows_small_displacements_alone(tmp_path: Path) ->
 
 def test_a_file_where_the_folder_should_be(tmp_path: Path) -> None:
     (tmp_path / "o").write_text("")
-    with pytest.raises(OutputError, match=r"--out must be a folder that can be written, but .* is not: File exists"):
+    with pytest.raises(OutputError, match=r"--out must be a folder, but .* is a file"):
         run(GRIPPER, "--kind", "lumped", "--out", tmp_path / "o")
 
 

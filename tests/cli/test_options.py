@@ -2,6 +2,7 @@
 
 import click
 import pytest
+from click.shell_completion import ShellComplete
 
 from fingervision.cli import COMMONEST, cli
 from fingervision.cli._command import FileName, Option
@@ -59,3 +60,9 @@ def test_the_commonest_commands_stand_first_and_no_sentence_is_cut() -> None:
         if isinstance(command, click.Group):
             words = " ".join(command.get_help(click.Context(command, info_name=path[-1])).split())
             assert "..." not in words.partition("Commands:")[2].partition("Examples:")[0]
+
+
+@pytest.mark.parametrize("words", [["effects"], ["diagnose", "--with"], ["bed", "run", "--hide"]])
+def test_names_of_effects_complete(words: list[str]) -> None:
+    found = ShellComplete(cli, {}, "fingervision", "_FINGERVISION_COMPLETE").get_completions(words, "back")
+    assert [each.value for each in found] == ["backlash"]

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from matplotlib.text import Text
 
 from fingervision.cli import cli
-from fingervision.diagnosis.report.figure_files import effect_figure, gap_against_input
+from fingervision.diagnosis.report.figure_files import effect_figure
 from fingervision.diagnosis.report.frame_strip import strip_html, turning_rows
 from fingervision.diagnosis.report.html_parts import GapCurves, bullets, named
+from fingervision.diagnosis.report.paper_figure import WIDTHS_MM, paper_figure
 from fingervision.domain.errors import UsageError
 from fingervision.effects import catalogue
 
@@ -120,7 +122,7 @@ def test_markup_in_a_sentence_of_the_report_is_text() -> None:
 def test_figures_are_vectors_and_the_same_each_time(rig: Path, answer: Path) -> None:
     again = rig / "again"
     assert run("diagnose", rig / MEASURED, "--model", rig / STRAIGHT, "--out", again).exit_code == 0
-    for name in ("gap_against_input", "gap_over_time", "residuals"):
+    for name in ("gap_against_input", "gap_against_input_85mm", "gap_over_time", "residuals"):
         drawn = (answer / f"{name}.svg").read_bytes()
         assert drawn == (again / f"{name}.svg").read_bytes()
         assert b"<image" not in drawn
@@ -136,10 +138,61 @@ def test_dashes_stay_dashes_where_the_input_goes_forth_and_back() -> None:
     predictions = {"static": 1.0 + 7.0 * input_mm, "loop": 1.0 + 7.0 * input_mm + 0.4 * ~opens}
     zero = np.zeros(180)
     curves = GapCurves(input_mm, predictions["loop"], zero, opens, None, (slice(0, 180),), predictions)
-    lines = {line.get_label(): line for line in gap_against_input(curves, "").axes[0].get_lines()}
-    assert np.all(np.diff(lines["static"].get_xdata()) >= 0.0)
-    # Both branches of a loop are drawn.
-    np.testing.assert_array_equal(lines["loop"].get_xdata(), input_mm)
+    static, *loop = [line for line in paper_figure(curves).axes[0].get_lines() if line.get_linestyle() != "None"]
+    assert np.all(np.diff(static.get_xdata()) >= 0.0)
+    # Both branches of a loop are drawn, each in its own style.
+    assert {line.get_linestyle() for line in loop if np.ptp(line.get_ydata()) > 3.0} == {"-", "--"}
+    drawn = {(x, y) for line in loop for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)}
+    assert drawn == set(zip(input_mm, predictions["loop"], strict=True))
+
+
+@pytest.mark.parametrize("width_mm", WIDTHS_MM.values())
+def test_the_figure_for_a_paper_shows_apart_what_coincides(width_mm: float) -> None:
+    input_mm = np.concatenate([np.linspace(0.0, 1.0, 100), np.linspace(1.0, 0.0, 100)])
+    opens = np.repeat([True, False], 100)
+    model = 4.0 + 7.7 * input_mm
+    curves = GapCurves(
+        input_mm, model - 0.05 * opens, np.full(200, 0.01), opens, None, (slice(0, 200),), {"model": model}
+    )
+    figure = paper_figure(curves, "Title", width_mm=width_mm)
+    assert figure.get_size_inches()[0] * 25.4 == pytest.approx(width_mm)
+    figure.draw_without_rendering()
+    upper, lower = figure.axes
+    (inset,) = upper.child_axes
+    # In the inset, the two directions are apart by a tenth of its height or more.
+    assert 0.05 / np.ptp(inset.get_ylim()) > 0.1
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["measured, opening", "measured, closing", "±U, random (k = 2)", "model, opening", "model, closing"]
+    assert {line.get_markerfacecolor() == line.get_color() for line in lower.get_lines()[1:]} == {True, False}
+    sizes = {text.get_fontsize() for text in figure.findobj(Text) if text.get_text()}
+    assert sizes == {8.0}
+    edges = figure.legends[0].get_window_extent()
+    assert edges.x1 <= figure.bbox.x1
+
+
+def test_curves_that_are_apart_need_no_inset() -> None:
+    input_mm = np.linspace(0.0, 1.0, 50)
+    model = 4.0 + 7.7 * input_mm
+    curves = GapCurves(
+        input_mm, model + 1.0, np.full(50, 0.01), np.ones(50, dtype=bool), None, (slice(0, 50),), {"model": model}
+    )
+    assert not paper_figure(curves).axes[0].child_axes
+
+
+def test_title_and_names_stand_in_the_figures(rig: Path) -> None:
+    out = rig / "named"
+    words = ("--name", f"{STRAIGHT}=finite elements", "--title", "Gripper 3")
+    done = run("compare", rig / MEASURED, "--model", rig / STRAIGHT, *words, "--out", out)
+    assert done.exit_code == 0, done.output
+    drawn = (out / "compare_gap_against_input.svg").read_text(encoding="utf-8")
+    assert "finite elements, opening" in drawn
+    assert "Gripper 3" in drawn
+    assert "finite elements" in (out / "compare.html").read_text(encoding="utf-8")
+
+
+def test_a_name_of_no_model_is_refused(rig: Path) -> None:
+    done = run("compare", rig / MEASURED, "--model", rig / STRAIGHT, "--name", "other.csv=words")
+    assert isinstance(done.exception, UsageError)
 
 
 def test_several_models_stand_in_one_table(rig: Path, answer: Path) -> None:

@@ -35,7 +35,7 @@ def test_the_stub_names_the_same(package) -> None:
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
 def test_what_is_public_is_documented_with_an_example(package) -> None:
-    plain = {"__version__", "effects"}
+    plain = {"__version__", "batch", "effects"}
     for name in set(package.__all__) - plain:
         assert (getattr(package, name).__doc__ or "").strip(), name
     functions = [getattr(package, name) for name in package.__all__ if name[0].islower() and name not in plain]

@@ -9,7 +9,7 @@ from fingervision.diagnosis.diagnose import Diagnosis
 from fingervision.diagnosis.report.figure_files import residual_figure, write_figures
 from fingervision.diagnosis.report.frame_strip import strip_html
 from fingervision.diagnosis.report.positioning_of_data import positioning_section
-from fingervision.diagnosis.report.report_page import curves_of, report_page
+from fingervision.diagnosis.report.report_page import SIMULATION, curves_of, report_page
 from fingervision.diagnosis.report.residual_localization import by_channel
 from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR
 from fingervision.domain.effect import effect_key
@@ -66,7 +66,15 @@ def _uncertainty(summary: Mapping[str, Any]) -> list[str]:
 PAGE, REPORT, MODEL, NEXT_RUN = "report.html", "report.json", "model.toml", "next_run.toml"
 
 
-def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Provenance, table: Path) -> dict[str, object]:
+def write_answer(
+    out: Path,
+    done: Diagnosis,
+    model: CorrectedModel,
+    made: Provenance,
+    table: Path,
+    title: str = "",
+    name: str = SIMULATION,
+) -> dict[str, object]:
     """Write the files of a diagnosis into a folder, replacing earlier ones, and return the content of report.json.
 
     Parameters
@@ -81,6 +89,10 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
         Files, command and versions from which the result was obtained.
     table : Path
         Path of the measured table, next to which its recording is searched.
+    title : str
+        Title of the plots.
+    name : str
+        Name of the model in the legends.
     """
     report = done.report
     names = model.base.names if isinstance(model.base, FunctionModel) else None
@@ -95,7 +107,7 @@ def write_answer(out: Path, done: Diagnosis, model: CorrectedModel, made: Proven
     write_report(out / REPORT, document)
     before, after = (by_channel(done.data, mm) for mm in (done.before_mm, done.after_mm))
     residuals = residual_figure(before, after if report.effects else None, done.data.chain.history, done.left_out)
-    write_figures(out, curves_of(done), residuals, f"{Path(model.base_path).name}: {report.verdict}")
+    write_figures(out, curves_of(done, name), residuals, title, left_out=done.left_out)
     (out / PAGE).write_text(report_page(done, made, strip_html(table), measurement_words(table)), encoding="utf-8")
     return document
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from fingervision.diagnosis.compare import Comparison
-from fingervision.diagnosis.report.figure_files import png_bytes, residual_figure, write_figures
+from fingervision.diagnosis.report.figure_files import residual_figure, write_figures
 from fingervision.diagnosis.report.frame_strip import strip_html
 from fingervision.diagnosis.report.html_parts import (
     HINT,
@@ -22,6 +22,7 @@ from fingervision.diagnosis.report.html_parts import (
     provenance_html,
     table,
 )
+from fingervision.diagnosis.report.vector_figure import png_bytes
 from fingervision.storage.provenance import Provenance
 
 PAGE, COMPARISON, PICTURE = "compare.html", "compare.json", "compare.png"
@@ -42,21 +43,25 @@ def comparison_document(found: Mapping[str, Comparison], made: Provenance) -> di
     return {**first, "models": models, "provenance": made.document()}
 
 
-def write_comparison(out: Path, found: Mapping[str, Comparison], made: Provenance, measured: Path) -> dict[str, object]:
+def write_comparison(
+    out: Path, found: Mapping[str, Comparison], made: Provenance, measured: Path, title: str = ""
+) -> dict[str, object]:
     """Write HTML page, plots and compare.json into an existing folder, and return the content of compare.json.
 
-    The recording from which the table `measured` was made is searched for in the folder of the table.
+    The recording from which the table `measured` was made is searched for in the folder of the table; `title` heads the
+    page and the plots.
     """
     document = comparison_document(found, made)
     (out / COMPARISON).write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    curves, residuals = _curves(found), residuals_of(found)
+    curves, residuals = curves_of(found), residuals_of(found)
     (out / PICTURE).write_bytes(png_bytes(residuals))
-    write_figures(out, curves, residuals, " and ".join(found), prefix="compare_")
-    (out / PAGE).write_text(_page(found, curves, made, strip_html(measured)), encoding="utf-8")
+    write_figures(out, curves, residuals, title, left_out=left_out_of(found), prefix="compare_")
+    (out / PAGE).write_text(_page(found, curves, made, strip_html(measured), title), encoding="utf-8")
     return document
 
 
-def _curves(found: Mapping[str, Comparison]) -> GapCurves:
+def curves_of(found: Mapping[str, Comparison]) -> GapCurves:
+    """Measured gap, and the gap that each model predicts."""
     first = next(iter(found.values()))
     predictions = {name: one.data.chain.stacked({}) for name, one in found.items()}
     return gap_curves(first.data, first.noise_mm, predictions)
@@ -67,18 +72,17 @@ def residuals_of(found: Mapping[str, Comparison]) -> Figure:
     first = next(iter(found.values()))
     if len(found) == 1:
         return residual_figure(first.residual_mm, None, first.data.chain.history, first.left_out)
-    return residual_figure(
-        {name: one.residual_mm["gap"] for name, one in found.items()}, None, first.data.chain.history, _left_out(found)
-    )
+    residuals = {name: one.residual_mm["gap"] for name, one in found.items()}
+    return residual_figure(residuals, None, first.data.chain.history, left_out_of(found))
 
 
-def _left_out(found: Mapping[str, Comparison]) -> tuple[int, ...]:
+def left_out_of(found: Mapping[str, Comparison]) -> tuple[int, ...]:
     """Rows left out for every model, because a row left out for one model may be a disagreement with another model."""
     return tuple(sorted(set.intersection(*(set(one.left_out) for one in found.values()))))
 
 
-def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, frames: str) -> str:
-    charts = charts_of(curves, {name: one.residual_mm["gap"] for name, one in found.items()}, _left_out(found))
+def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, frames: str, title: str) -> str:
+    charts = charts_of(curves, {name: one.residual_mm["gap"] for name, one in found.items()}, left_out_of(found))
     names = {
         "gap-input": "Gap over the input, measured and predicted",
         "gap-time": "Gap over time, measured and predicted",
@@ -107,4 +111,4 @@ def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, 
         ("Notes", bullets([*first.data.notes, *first.data.refitted()])),
         ("Where this comes from", provenance_html(made)),
     ]  # fmt: skip
-    return page("fingervision: comparison", "Measurement beside model", verdict, sections, charts)
+    return page("fingervision: comparison", title or "Measurement beside model", verdict, sections, charts)

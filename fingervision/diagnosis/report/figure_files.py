@@ -1,64 +1,20 @@
 """The plots of a report as files: gap against input, gap over time and residuals, each as SVG and PDF."""
 
-import io
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.report.html_parts import GapCurves
 from fingervision.diagnosis.report.left_out_rows import outside_words
+from fingervision.diagnosis.report.paper_figure import COLOURS, FEW_ROWS, MEASURED, WIDTHS_MM, paper_figure
+from fingervision.diagnosis.report.vector_figure import FORMATS, plain_style, write_vector
 from fingervision.domain.effect import Array, Flags, History
 from fingervision.effects import catalogue
 from fingervision.models.table import TableModel
-
-# Plots as files for a paper: SVG and PDF, identical for identical data; PNG for an HTML page.
-
-
-FORMATS = ("svg", "pdf")
-PNG_DPI = 110
-"""Resolution of the pictures beside the vector figures: about one pixel of a desktop screen per pixel."""
-
-
-def plain_style() -> AbstractContextManager[None]:
-    """Apply the common style of a report's plots; text is stored as text, so that it can be searched and edited."""
-    style: dict[str, object] = {
-        "font.size": 9,
-        "axes.titlesize": 10,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "svg.fonttype": "none",
-        "svg.hashsalt": "fingervision",
-        "pdf.fonttype": 42,
-    }
-    return mpl.rc_context(style)  # type: ignore[arg-type]
-
-
-def write_vector(figure: Figure, stem: Path) -> tuple[Path, ...]:
-    """Write a plot as SVG and as PDF; `stem` is the path without its suffix."""
-    written = []
-    for kind in FORMATS:
-        path = stem.with_name(f"{stem.name}.{kind}")
-        metadata = {"Date": None} if kind == "svg" else {"CreationDate": None, "Producer": None}
-        with plain_style():
-            figure.savefig(path, format=kind, metadata=metadata)
-        written.append(path)
-    return tuple(written)
-
-
-def png_bytes(figure: Figure) -> bytes:
-    """Encode a plot as PNG."""
-    buffer = io.BytesIO()
-    with plain_style():
-        figure.savefig(buffer, format="png", dpi=PNG_DPI)
-    return buffer.getvalue()
-
 
 # Plot of the residuals before and after the correction, over the input and over time.
 
@@ -181,42 +137,8 @@ def effect_figure(name: str) -> Figure:
     return residual_figure(residual, None, history)
 
 
-# Plots of gap against input, and of gap over time: measurement, simulation, corrected model.
-
-MEASURED = "#222222"
-LINES = (("#c0392b", "--"), ("#1f618d", "-"), ("#7d3c98", "-."), ("#117a65", ":"))
-"""Colour and line style of the predictions in their order, distinguishable in black and white too."""
-RETRACED = 0.005
-"""Share of the range of a predicted gap within which its opening and closing are one line: half the width of a line."""
-FEW_ROWS = 80
-"""Number of rows up to which each reading has a marker with an error bar; more error bars would merge."""
-
-
-def gap_against_input(curves: GapCurves, title: str) -> Figure:
-    """Plot the gap over the recorded input, opening and closing distinguished (Hricko & Havlik, 2015, figure 9)."""
-    with plain_style():
-        figure = Figure(figsize=(6.3, 4.2), layout="constrained")
-        axes = figure.subplots()
-        ways = [
-            (curves.opens, "^", MEASURED, "measured, opening"),
-            (~curves.opens, "v", "none", "measured, closing"),
-        ]
-        if not curves.directed:
-            ways = [(np.ones(curves.gap_mm.size, dtype=bool), "o", "none", "measured")]
-        for which, marker, face, label in ways:
-            if which.any():
-                _readings(axes, curves.input_mm[which], curves, which, marker, face, label)
-        for (name, gap_mm), (colour, dash) in zip(curves.predictions.items(), LINES, strict=False):
-            once = _in_order(curves, gap_mm)
-            if once is None:
-                _path(axes, curves.input_mm, gap_mm, curves.runs, colour, dash, name)
-            else:
-                axes.plot(curves.input_mm[once], gap_mm[once], dash, color=colour, lw=1.3, label=name)
-        axes.set_xlabel("input of the stage, mm")
-        axes.set_ylabel("gap between the fingertips, mm")
-        axes.set_title(title)
-        axes.legend(frameon=False)
-    return figure
+LINES = tuple(zip(COLOURS, ("--", "-", "-.", ":"), strict=True))
+"""Colour and line style of the predictions over time, in their order."""
 
 
 def gap_over_time(curves: GapCurves, title: str) -> Figure | None:
@@ -248,26 +170,6 @@ def _readings(axes: Axes, x: Array, curves: GapCurves, which: Flags, marker: str
         axes.plot(x, gap_mm, marker, color=MEASURED, mfc=face, ms=2.5, mew=0.5, ls="none", label=label)
 
 
-def _in_order(curves: GapCurves, gap_mm: Array) -> NDArray[np.intp] | None:
-    """Rows in order of the input if a prediction retraces itself; None if its opening differs from its closing.
-
-    A dashed line that is drawn forth and back over itself looks like a solid line.
-    """
-    order = np.argsort(curves.input_mm, kind="stable")
-    if not curves.directed:
-        return order
-    forth, back = order[curves.opens[order]], order[~curves.opens[order]]
-    same_mm = RETRACED * float(np.ptp(gap_mm))
-    if forth.size and back.size:
-        apart_mm = np.interp(curves.input_mm[back], curves.input_mm[forth], gap_mm[forth]) - gap_mm[back]
-        within = curves.input_mm[back] <= curves.input_mm[forth[-1]]
-        if np.any(np.abs(apart_mm[within]) > same_mm):
-            return None
-    back_and_forth_mm = np.diff(gap_mm[order])
-    turned = np.flatnonzero(back_and_forth_mm[1:] * back_and_forth_mm[:-1] < 0.0)
-    return None if np.any(np.abs(back_and_forth_mm[turned]) > same_mm) else order
-
-
 def _path(axes: Axes, x: Array, gap_mm: Array, runs: tuple[slice, ...], colour: str, dash: str, name: str) -> None:
     for number, run in enumerate(runs):
         axes.plot(x[run], gap_mm[run], dash, color=colour, lw=1.3, label=name if number == 0 else None)
@@ -276,7 +178,9 @@ def _path(axes: Axes, x: Array, gap_mm: Array, runs: tuple[slice, ...], colour: 
 INPUT, TIME, RESIDUALS = "gap_against_input", "gap_over_time", "residuals"
 
 
-def write_figures(out: Path, curves: GapCurves, residuals: Figure, title: str, *, prefix: str = "") -> tuple[Path, ...]:
+def write_figures(
+    out: Path, curves: GapCurves, residuals: Figure, title: str, *, left_out: Sequence[int] = (), prefix: str = ""
+) -> tuple[Path, ...]:
     """Write the plots into a folder, replacing earlier ones.
 
     Parameters
@@ -288,7 +192,9 @@ def write_figures(out: Path, curves: GapCurves, residuals: Figure, title: str, *
     residuals : Figure
         Plot of measured minus predicted values.
     title : str
-        Title of the plots.
+        Title of the plots; may be empty.
+    left_out : sequence of int
+        Rows that the scale of the residuals does not consider.
     prefix : str
         Beginning of the file names, so that two commands can write to one folder.
     """
@@ -296,7 +202,11 @@ def write_figures(out: Path, curves: GapCurves, residuals: Figure, title: str, *
     if over_time is None:
         for kind in FORMATS:
             (out / f"{prefix}{TIME}.{kind}").unlink(missing_ok=True)
-    figures = {INPUT: gap_against_input(curves, title), TIME: over_time, RESIDUALS: residuals}
+    if title:
+        residuals.suptitle(title)
+    figures = {TIME: over_time, RESIDUALS: residuals}
+    for end, width_mm in WIDTHS_MM.items():
+        figures[INPUT + end] = paper_figure(curves, title, width_mm=width_mm, left_out=left_out)
     return tuple(
         path
         for name, figure in figures.items()

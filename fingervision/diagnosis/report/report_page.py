@@ -9,7 +9,7 @@ import numpy as np
 from fingervision.diagnosis.bodies.body_evidence import drawing_of
 from fingervision.diagnosis.diagnose import Diagnosis
 from fingervision.diagnosis.inference.verdict import UNDECIDED
-from fingervision.diagnosis.report.figure_files import effect_figure, png_bytes, residual_figure
+from fingervision.diagnosis.report.figure_files import effect_figure, residual_figure
 from fingervision.diagnosis.report.html_parts import (
     HINT,
     GapCurves,
@@ -29,6 +29,7 @@ from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.report_parts import added_sections
 from fingervision.diagnosis.report.residual_localization import by_channel
 from fingervision.diagnosis.report.sentences import EDGES, QUESTION
+from fingervision.diagnosis.report.vector_figure import png_bytes
 from fingervision.domain.report import DiagnosisReport, Disagreement, Verdict
 from fingervision.effects import catalogue
 from fingervision.storage.provenance import Provenance
@@ -46,15 +47,16 @@ UNEXPLAINED = {
 }
 """Headings of an *unknown* result by the beginning of its sentence."""
 NOWHERE = "<p>Nowhere significantly.</p>"
-SIMULATION, CORRECTED = "simulation", "corrected model"
+SIMULATION: str = "simulation"
+CORRECTED: str = "corrected model"
 
 
-def curves_of(diagnosis: Diagnosis) -> GapCurves:
+def curves_of(diagnosis: Diagnosis, name: str = SIMULATION) -> GapCurves:
     """Curves of measurement, simulation and, if effects were named, the corrected model."""
     data = diagnosis.data
-    predictions = {SIMULATION: data.stacked_mm - diagnosis.before_mm}
+    predictions = {name: data.stacked_mm - diagnosis.before_mm}
     if diagnosis.report.effects:
-        predictions[CORRECTED] = data.stacked_mm - diagnosis.after_mm
+        predictions[CORRECTED if name == SIMULATION else f"{name}, corrected"] = data.stacked_mm - diagnosis.after_mm
     return gap_curves(data, diagnosis.report.disagreement.noise_rms_mm, predictions)
 
 

@@ -208,11 +208,14 @@ class RunDone:
         Number of frames by status.
     resumed_after : int
         Number of frames recorded before an interruption; 0 for a new run.
+    table : Path
+        Measured table of the run, joined with the earlier run that it continues.
     """
 
     folder: Path
     counts: Counts
     resumed_after: int
+    table: Path
 
 
 def run_recipe(
@@ -279,4 +282,4 @@ def run_recipe(
     except BaseException as error:
         folder.break_off(str(error) or type(error).__name__)
         raise
-    return RunDone(out, counts, len(folder.rows))
+    return RunDone(out, counts, len(folder.rows), out / ("joined.csv" if before else "samples.csv"))
