@@ -6,6 +6,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent), str(HERE)]
 
+from generate.gallery import SETTINGS  # noqa: E402
+
 from fingervision import __version__  # noqa: E402 - found by the path above
 
 project = "fingervision"
@@ -17,10 +19,11 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
     "generate.pages",  # reference pages from the program itself
     "generate.mathml",  # formulas become MathML at build time
 ]
-exclude_patterns = ["_build", "_generated", "generate", "figures/*.py"]
+exclude_patterns = ["_build", "_generated", "generate", "figures/*.py", "paper.md", "gallery"]
 
 # Markdown as code hosts read it: $ maths $, tables, bare links, anchors of headings like theirs.
 myst_enable_extensions = ["dollarmath"]
@@ -38,9 +41,13 @@ napoleon_google_docstring = False
 napoleon_use_rtype = False
 napoleon_use_param = False
 napoleon_use_ivar = True
-autodoc_typehints = "signature"
+# The types of arguments stand in the docstrings; in a signature of fifteen arguments they hide the names.
+autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 python_use_unqualified_type_names = True
+
+# The gallery: scripts that are run when the manual is built.
+sphinx_gallery_conf = SETTINGS
 
 # Furo carries its own styles and scripts and uses the reader's fonts: nothing is fetched.
 html_theme = "furo"

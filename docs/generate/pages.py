@@ -9,7 +9,7 @@ from generate.citation import citation_page
 from generate.commands import commands_page
 from generate.effects import effects_page
 from generate.package_notes import NOTES, note
-from generate.python_interface import python_page
+from generate.python_interface import PAGES, plain_property, python_page
 from generate.recipe_kinds import recipe_kinds_page
 
 
@@ -19,7 +19,7 @@ def write_pages(app: Sphinx) -> None:
     folder.mkdir(exist_ok=True)
     (folder / "citation.md").write_text(citation_page(), encoding="utf-8")
     (folder / "commands.md").write_text(commands_page(), encoding="utf-8")
-    (folder / "python.md").write_text(python_page(), encoding="utf-8")
+    (folder / "python.md").write_text(python_page(Path(app.srcdir) / "reference" / PAGES), encoding="utf-8")
     (folder / "recipe_kinds.md").write_text(recipe_kinds_page(), encoding="utf-8")
     (folder / "notes").mkdir(exist_ok=True)
     for name in NOTES:
@@ -30,4 +30,5 @@ def write_pages(app: Sphinx) -> None:
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register with Sphinx."""
     app.connect("builder-inited", write_pages)
+    app.connect("autodoc-process-docstring", plain_property, priority=600)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

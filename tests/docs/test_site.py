@@ -34,7 +34,7 @@ class References(HTMLParser):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     build = pytest.importorskip("sphinx.cmd.build")
-    for name in ("myst_parser", "furo", "latex2mathml"):
+    for name in ("myst_parser", "furo", "latex2mathml", "sphinx_gallery"):
         pytest.importorskip(name)
     out = tmp_path_factory.mktemp("site")
     # -W: a warning is an error, among them links to headings, pages and files that are not there.
