@@ -201,8 +201,10 @@ def run_batch(
 
     Raises
     ------
+    UsageError
+        The request makes no sense.
     FingervisionError
-        The request makes no sense, nothing matches, or the results cannot be written.
+        Nothing matches, or the results cannot be written.
     """
     from contextlib import ExitStack
     from functools import partial

@@ -338,6 +338,8 @@ def predict_mechanism(
 
     Raises
     ------
+    UsageError
+        The drawing cannot be computed as asked.
     FingervisionError
         No kind of model can be computed.
     """
