@@ -22,9 +22,9 @@ for axes, name in zip(panels, families, strict=True):
     effect = fv.effects[name]
     values = {each.name: 0.1 * each.upper for each in effect.parameters if each.run is None}
     seen = fv.simulate(simulation, drive, effects={name: values})
-    for finger in ("left", "right"):
+    for finger, line in (("left", "-"), ("right", "--")):
         residual_um = 1e3 * (getattr(seen, f"{finger}_mm") - getattr(plain, f"{finger}_mm"))
-        axes.plot(input_mm, residual_um, label=finger)
+        axes.plot(input_mm, residual_um, line, label=finger)
     axes.set(title=name, xlabel="input, mm")
 panels[0].set_ylabel("measured - model, µm")
 panels[0].legend()

@@ -24,7 +24,7 @@ print(predicted.report())
 # The force over the input:
 
 figure, axes = plt.subplots(figsize=(5, 3.2), layout="constrained")
-for kind in predicted:
-    axes.plot(predicted[kind]["input_mm"], predicted[kind]["force_n"], label=kind)
+for kind, line in zip(predicted, ("-", "--"), strict=True):
+    axes.plot(predicted[kind]["input_mm"], predicted[kind]["force_n"], line, label=kind)
 axes.set(xlabel="input, mm", ylabel="force at the drive, N")
 axes.legend()
