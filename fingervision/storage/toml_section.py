@@ -188,7 +188,8 @@ class Section:
     def _stated(self, key: str, default: Any = None) -> Any:
         value = self.values.get(key, default)
         if value is None:
-            self.refuse(None, f"must state {key}, but does not: add it.")
+            near = difflib.get_close_matches(key, self.values, n=1)
+            self.refuse(None, f"must state {key}, but {f'states {near[0]}: rename' if near else 'does not: add'} it.")
         return value
 
     def _number(self, key: str, value: Any, field: Field) -> float:

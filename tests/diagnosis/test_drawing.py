@@ -127,10 +127,10 @@ def test_compare_refits_the_drawing_too_and_says_so(tmp_path: Path) -> None:
     ("lines", "words"),
     [
         ('kind = "lump"', r"must be one of finite_element, lumped, stiffness_matrix, but is lump: choose one"),
-        ('[[effect]]\nname = "backlsh"\n[effect.parameters]', r"but is backlsh: did you mean backlash\?"),
+        ('[[effect]]\nname = "backlsh"\n[effect.parameters]', r"but is 'backlsh': did you mean backlash\?"),
         (
             '[[effect]]\nname = "backlash"\n[effect.parameters]\nplay = { value = 0.01 }',
-            r"must state play_mm, but play_mm is not there \(it states play\): add it",
+            r"must state play_mm, but states play: rename it",
         ),
     ],
 )
