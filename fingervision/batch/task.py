@@ -3,10 +3,13 @@
 import errno
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 # Summary of one result for the overview: a table row and a small plot.
 
@@ -36,7 +39,7 @@ class Digest:
     caption: str
 
 
-def thinned(values: NDArray[np.float64]) -> tuple[float | None, ...]:
+def thinned(values: "NDArray[np.float64]") -> tuple[float | None, ...]:
     """Select evenly spaced elements of an array, rounded to five significant digits.
 
     Parameters
@@ -45,8 +48,9 @@ def thinned(values: NDArray[np.float64]) -> tuple[float | None, ...]:
         Values; NaN for a missing value.
     """
     if values.size > CURVE_POINTS:
-        values = values[np.linspace(0, values.size - 1, CURVE_POINTS).round().astype(np.int64)]
-    return tuple(float(f"{value:.5g}") if np.isfinite(value) else None for value in values.tolist())
+        last = values.size - 1
+        values = values[[round(place * last / (CURVE_POINTS - 1)) for place in range(CURVE_POINTS)]]
+    return tuple(float(f"{value:.5g}") if isfinite(value) else None for value in values.tolist())
 
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
