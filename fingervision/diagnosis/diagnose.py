@@ -7,11 +7,11 @@ import numpy as np
 
 from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_diagnosis import diagnose_with_bodies, without_places
-from fingervision.diagnosis.inference.answer import judged, without_names
 from fingervision.diagnosis.inference.explanation_candidates import Progress
 from fingervision.diagnosis.inference.held_out_prediction import foretold
 from fingervision.diagnosis.inference.plausibility import mistaken_column, mixed_rows, swapped_directions
 from fingervision.diagnosis.inference.refitted_search import Refitted, refitted_search
+from fingervision.diagnosis.inference.verdict import judged, without_names
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.report.diagnosis_report import diagnosis_report

@@ -10,7 +10,7 @@ from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.motion.encoder import differences, input_sigma
-from fingervision.motion.path_between_rows import CORNER, FEWEST
+from fingervision.motion.encoder_path import CORNER, FEWEST
 
 # Intervals of a log in which the stage jumps between two rest positions, so that its position is unknown.
 

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
-from fingervision.motion.encoder_path import level_halts, sharp_reversals
+from fingervision.motion.encoder_path import STANDS, level_halts, piece, sharp_reversals
 from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
-from fingervision.motion.path_between_rows import STANDS, piece
 
 CORNER_ROWS = 3
 """Number of rows on either side of a corner that smoothing distorts."""

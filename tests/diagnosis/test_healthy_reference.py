@@ -10,9 +10,8 @@ from click.testing import CliRunner
 
 from fingervision.cli.diagnose import command
 from fingervision.diagnosis.bodies.body_evidence import drawing_of
-from fingervision.diagnosis.bodies.changed_gap import gap_changes
 from fingervision.diagnosis.bodies.healthy_reference import HealthyReference, Recording
-from fingervision.diagnosis.bodies.reference_report import Compared, change_words, drawing_svg
+from fingervision.diagnosis.bodies.reference_report import Compared, change_words, drawing_svg, gap_changes
 from fingervision.domain.errors import DataError
 from fingervision.domain.flexure_outline import FlexureOutline
 from fingervision.models.mechanism_bodies import column_name

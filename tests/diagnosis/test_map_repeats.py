@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingervision.diagnosis.inference.map_repeatability import foretells_other_passes
+from fingervision.diagnosis.inference.map_identifiability import foretells_other_passes
 from fingervision.diagnosis.inference.position_map import likeliest_map, why_no_map
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.effect import History

@@ -7,9 +7,8 @@ import pytest
 
 from fingervision.diagnosis.design.augmented_dataset import AugmentedDataset
 from fingervision.diagnosis.design.expected_gain import expected_gain, surest
-from fingervision.diagnosis.design.experiment_design import NEEDED
-from fingervision.diagnosis.design.further_evidence import checks_between, further_evidence
-from fingervision.diagnosis.design.next_run import next_run
+from fingervision.diagnosis.design.next_look import checks_between, further_evidence
+from fingervision.diagnosis.design.next_run import NEEDED, next_run
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.posterior import draws

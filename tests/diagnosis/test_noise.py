@@ -5,10 +5,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from fingervision.diagnosis.noise.channel_noises import most_noise, noise_by_spectrum
 from fingervision.diagnosis.noise.noise_model import Noise, gate
-from fingervision.diagnosis.noise.residual_scatter import most_noise
 from fingervision.diagnosis.noise.restricted_likelihood import noise_of_short_runs
-from fingervision.diagnosis.noise.spectrum import noise_by_spectrum
 
 SEED = 3
 DRAWS = 30

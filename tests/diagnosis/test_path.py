@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
+from fingervision.diagnosis.input.observations import stalled_ends
 from fingervision.diagnosis.input.preparation import prepare
-from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.domain.report import Verdict
 from fingervision.motion.encoder import on_lines
 from fingervision.motion.recorded_input import is_commanded

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from fingervision.diagnosis.noise.channel_noises import most_noise
 from fingervision.diagnosis.noise.replicates import pure_error, resolution, visits
-from fingervision.diagnosis.noise.residual_scatter import most_noise
 
 SCATTER_MM = 0.003
 TARGETS = np.arange(-20.0, 21.0, 5.0)

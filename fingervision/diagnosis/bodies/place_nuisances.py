@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction
 from fingervision.diagnosis.bodies.channel_noise import ChannelNoise
-from fingervision.diagnosis.bodies.mirror_image import mirror_of, mirrored_channels
-from fingervision.diagnosis.bodies.place_candidates import Candidate
+from fingervision.diagnosis.bodies.place_candidates import Candidate, mirror_of, mirrored_channels
 from fingervision.domain.drawing_form import DrawnPart
 
 Array = NDArray[np.float64]

@@ -9,11 +9,13 @@ import numpy as np
 from fingervision.diagnosis.inference.explanation_candidates import different
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
-from fingervision.diagnosis.inference.map_imitators import imitating_effects, imitating_parts
-from fingervision.diagnosis.inference.map_repeatability import foretells_other_passes
+from fingervision.diagnosis.inference.map_identifiability import (
+    foretells_other_passes,
+    imitating_effects,
+    imitating_parts,
+)
 from fingervision.diagnosis.inference.position_map import NAME, PositionMap, likeliest_map, why_no_map
-from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
-from fingervision.diagnosis.inference.run_gains import FEWEST_RUNS, RunGains, likeliest_gains
+from fingervision.diagnosis.inference.random_effect import FEWEST_RUNS, LEAST_GAIN, RunGains, likeliest_gains
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import ambiguity_set, beside_foretold, odds
-from fingervision.diagnosis.inference.detection_limit import detection_limits
 from fingervision.diagnosis.inference.explanation_candidates import (
     LEAST_GAIN,
     Progress,
@@ -26,7 +25,7 @@ from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure
 from fingervision.diagnosis.inference.search_state import ROUGH, Findings, SearchState, completes, noise_known
-from fingervision.diagnosis.inference.significance import Evidence
+from fingervision.diagnosis.inference.significance import Evidence, detection_limits
 from fingervision.diagnosis.inference.verdict import STANDING_SHARE
 
 TRIPLE_SHARE = 0.15

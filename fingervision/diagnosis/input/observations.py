@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.inference.position_map import PositionMap
-from fingervision.diagnosis.inference.run_gains import RunGains
+from fingervision.diagnosis.inference.random_effect import RunGains
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.input.driven_model import with_dynamics
 from fingervision.diagnosis.input.record_nuisances import TurningErrors
-from fingervision.diagnosis.input.stalled_ends import stalled_ends
 from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
 from fingervision.diagnosis.noise.noise_model import Noise, gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
@@ -23,11 +22,49 @@ from fingervision.diagnosis.noise.whitening import Whitener
 from fingervision.domain.effect import Array, Effect, Flags
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
+from fingervision.effects import catalogue
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import FunctionModel
 from fingervision.motion.clock.noise import even_variance
 from fingervision.motion.input_path import NO_TURNS, UnseenTurns, input_path, turning_readings
 from fingervision.motion.recorded_input import RecordedInput
+
+FEWEST_EQUAL = 6
+"""Least number of equal readings at an end that does not occur by chance."""
+LONGER = 3.0
+"""Ratio to the longest constant stretch elsewhere, in rows and in predicted motion, because the steps of a dead band
+are constant too."""
+LEAST_DIGITS = 5.0
+"""Digits of the reading by which the model must move while the reading is constant."""
+
+
+def stalled_ends(input_mm: Array, predicted_mm: Array, gap_mm: Array) -> frozenset[str]:
+    """Effects that would explain a constant reading at an end of the range.
+
+    Noise changes a reading from row to row; readings that are equal over many rows, while the model moves by many
+    digits, have another cause.
+
+    Parameters
+    ----------
+    input_mm, predicted_mm, gap_mm : ndarray of float, shape (n,)
+        Recorded input, predicted and measured gap.
+    """
+    order = np.argsort(input_mm, kind="stable")
+    gap, predicted = gap_mm[order], predicted_mm[order]
+    digit = resolution(gap_mm)
+    changes = np.flatnonzero(np.abs(np.diff(gap)) > 0.5 * digit) + 1
+    borders = np.concatenate([[0], changes, [gap.size]])
+    rows = np.diff(borders)
+    motion = np.maximum.reduceat(predicted, borders[:-1]) - np.minimum.reduceat(predicted, borders[:-1])
+    found: frozenset[str] = frozenset()
+    for end, word in ((0, "closed"), (rows.size - 1, "open")):
+        others = np.arange(rows.size) != end
+        least = max(float(FEWEST_EQUAL), LONGER * float(rows[others].max(initial=0)))
+        far = max(LEAST_DIGITS * digit, LONGER * float(motion[others].max(initial=0.0)))
+        if rows.size > 1 and rows[end] >= least and motion[end] > far:
+            found |= {name for name, effect in catalogue().items() if word in effect.stands_at}
+    return found
+
 
 OF_NOISE = 0.1
 """Error of a dynamic model's remainder, as a share of the noise, above which it is recomputed with the effects

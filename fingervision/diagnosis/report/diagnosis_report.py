@@ -7,17 +7,15 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import binomtest
 
-from fingervision.diagnosis.design.further_evidence import further_evidence
-from fingervision.diagnosis.design.next_look import next_look
+from fingervision.diagnosis.design.next_look import further_evidence, next_look
 from fingervision.diagnosis.design.next_run import next_run
-from fingervision.diagnosis.inference.answer import Answer
 from fingervision.diagnosis.inference.held_out_prediction import left_out_rms_mm, rms_mm
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.search_state import Findings
-from fingervision.diagnosis.inference.verdict import verdict
+from fingervision.diagnosis.inference.verdict import Answer, verdict
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import PureError
 from fingervision.diagnosis.report.left_out_rows import outlier_rows, outliers
