@@ -174,11 +174,13 @@ def bed(
 
     Examples
     --------
+    The encoder of the simulated stage has steps of 0.03 mm:
+
     >>> import fingervision as fv
     >>> with fv.bed() as bed:
     ...     at_mm = bed.move(0.5)
     >>> print(f"{at_mm:.2f} mm")
-    0.50 mm
+    0.48 mm
     """
     words = (hide,) if isinstance(hide, str) else tuple(hide)
     earlier = None if after is None else path_of("after", after, "the folder of a run")
