@@ -17,7 +17,7 @@ from fingervision.cli import cli
 from fingervision.domain.errors import FingervisionError
 
 FENCE = re.compile(
-    r"^(?:<!-- (?P<remark>[^\n]*?) -->\n+)?"
+    r"^(?: *<!-- (?P<remark>[^\n]*?) -->\n+)?"
     r"(?P<indent> *)```(?P<language>[\w{}-]*)[^\n]*\n(?P<body>.*?)^(?P=indent)```$",
     re.MULTILINE | re.DOTALL,
 )
