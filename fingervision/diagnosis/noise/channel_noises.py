@@ -1,6 +1,5 @@
 """Noise of every channel, estimated from repeats, from stops of the stage, or from the residual's spectrum."""
 
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -19,8 +18,6 @@ TAPERED = 1.94
 """Number of neighbouring ordinates that count as one, because Hann's taper correlates them."""
 CORRELATIONS = tuple(float(phi) for phi in np.linspace(0.05, 0.95, 46))
 """Correlations of neighbouring samples that are tried, as dense as a record of 2500 samples can distinguish."""
-KINDS = (slice(0, 1), slice(1, 1 + len(CORRELATIONS)), slice(1 + len(CORRELATIONS), None))
-"""White noise, autoregressions, and their sums, among all forms of the spectrum that are tried."""
 SLOWEST = 2.0 * np.pi * np.array([0.01])
 """Frequency at which the effects of a gripper have most of their power: about one period in a hundred samples."""
 LINE = 9.0
@@ -121,40 +118,37 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
     slow_doubt : float
         Standard uncertainty of the logarithm of the power at `SLOWEST`, over all kinds of noise.
     """
-    tried, forms, log_forms = _forms(angle.tobytes())
+    mixed = [(share, phi) for share in np.linspace(0.1, 0.9, 9) for phi in CORRELATIONS]
+    kinds = ([(0.0, 0.0)], [(1.0, phi) for phi in CORRELATIONS], mixed)
+    tried = np.array([each for kind in kinds for each in kind])
+    forms = np.array([shape(angle, share, phi) for share, phi in tried])
     levels = [np.log(_variances(power, kept, forms)) for power, kept in zip(powers, use, strict=True)]
-    costs = sum(kept.sum() * level + log_forms @ kept.astype(float) for kept, level in zip(use, levels, strict=True))
+    costs = sum(
+        kept.sum() * level + np.log(forms[:, kept]).sum(axis=1) for kept, level in zip(use, levels, strict=True)
+    )
     slow = np.mean(levels, axis=0) + np.log([shape(SLOWEST, share, phi)[0] for share, phi in tried])
     found: list[tuple[float, float, float]] = []
-    for kind in KINDS:
-        own = costs[kind]
+    begin = 0
+    for kind in kinds:
+        own = costs[begin : begin + len(kind)]
+        begin += len(kind)
         weight = np.exp(-(own - own.min()) / TAPERED)
-        share, phi = np.average(tried[kind], axis=0, weights=weight)
+        share, phi = np.average(np.array(kind), axis=0, weights=weight)
         found.append((-own.min() / TAPERED + float(np.log(np.mean(weight))), min(float(share), 1.0), float(phi)))
     _, share, phi = max(found)
-    prior = np.concatenate([np.full(costs[kind].size, 1.0 / costs[kind].size) for kind in KINDS])
+    prior = np.concatenate([np.full(len(kind), 1.0 / len(kind)) for kind in kinds])
     likely = prior * np.exp(-(costs - costs.min()) / TAPERED)
     order = np.argsort(slow)
     reached = np.cumsum(likely[order]) / likely.sum()
     low, high = np.interp((0.159, 0.841), reached, slow[order])
-    form = 1.0 / shape(angle, share, phi)[None]
+    form = shape(angle, share, phi)[None]
     best = [float(_variances(power, kept, form)[0]) for power, kept in zip(powers, use, strict=True)]
     return best, share, max(phi, 1e-3), 0.5 * float(high - low)
 
 
-@lru_cache(maxsize=2)
-def _forms(angles: bytes) -> tuple[Array, Array, Array]:
-    """Shares and correlations that are tried, one over each one's spectrum, and its logarithm; shape (k, m)."""
-    angle = np.frombuffer(angles)
-    mixed = [(share, phi) for share in np.linspace(0.1, 0.9, 9) for phi in CORRELATIONS]
-    tried = np.array([(0.0, 0.0), *((1.0, phi) for phi in CORRELATIONS), *mixed])
-    forms = np.array([shape(angle, share, phi) for share, phi in tried])
-    return tried, 1.0 / forms, np.log(forms)
-
-
-def _variances(power: Array, kept: Flags, inverse_forms: Array) -> Array:
+def _variances(power: Array, kept: Flags, forms: Array) -> Array:
     """Variance of one sample, for each form of the spectrum; shape (k,)."""
-    return np.asarray(np.maximum(inverse_forms @ np.where(kept, power, 0.0) / max(1, kept.sum()), 1e-24))
+    return np.asarray(np.maximum((power[kept] / forms[:, kept]).mean(axis=1), 1e-24), dtype=np.float64)
 
 
 FEWEST_STANDING = 60
