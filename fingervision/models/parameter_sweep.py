@@ -171,8 +171,8 @@ def varied(gripper: Gripper, variations: Sequence[Variation], values: Sequence[f
             now = None
         if not isinstance(now, float):
             raise UsageError(
-                f"--vary must name a number of the drawing as gripper.toml does, such as hinge.thickness_mm, but names "
-                f"{variation.name}."
+                "--vary and --solve must name a number of the drawing as gripper.toml does, such as "
+                f"hinge.thickness_mm, but {variation.name} is none."
             )
         gripper = redrawn(gripper, variation.name, value - now)
     return gripper
