@@ -2,18 +2,41 @@
 
 import random
 import re
+import select
 import socket
 import struct
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from operator import itemgetter
 from time import monotonic, sleep
+from typing import ClassVar
+
+from fingervision.testbed.clocks.clock import VirtualClock
 
 
 class Time:
     """The time of all emulators: the computer's, or that of a test bed whose time is virtual."""
 
     now_s: Callable[[], float] = staticmethod(monotonic)
+    # What a controller does by itself, at its virtual time; none of it where time is the computer's.
+    due: list[tuple[float, Callable[[], None]]] | None = None
+
+
+class EmulatorsClock(VirtualClock):
+    """A virtual clock that advances only when every controller has heard what it was told.
+
+    Otherwise, seconds of virtual time may pass while the computer does not find a moment for a controller's thread.
+    """
+
+    def wait_until(self, time_s: float) -> None:
+        for each in tuple(Emulator.plugged):
+            each.settle()
+        super().wait_until(time_s)
+        for at_s, act in sorted(Time.due or (), key=itemgetter(0)):
+            if at_s <= self.now_s() and Time.due is not None:
+                Time.due.remove((at_s, act))
+                act()
 
 
 # GRBL and Marlin state their position in steps of a motor.
@@ -65,9 +88,11 @@ class Emulator:
 
     end = b"\n"
     immediate = b""
+    plugged: ClassVar[set["Emulator"]] = set()
 
     def __init__(self) -> None:
         self.plant, self.heard = Plant(), list[str]()
+        self._turn = threading.Lock()
         self.nonsense = self.silent = False
         self._listener: socket.socket | None = None
         self._client: socket.socket | None = None
@@ -82,8 +107,10 @@ class Emulator:
         self._listener = socket.create_server(("127.0.0.1", self._number))
         self._number = self._listener.getsockname()[1]
         threading.Thread(target=self._serve, args=(self._listener,), daemon=True).start()
+        self.plugged.add(self)
 
     def unplug(self) -> None:
+        self.plugged.discard(self)
         for each in (self._listener, self._client):
             if each is not None:
                 with suppress(OSError):
@@ -103,11 +130,22 @@ class Emulator:
 
     def _talk(self, client: socket.socket) -> None:
         rest = b""
-        try:
-            while data := client.recv(4096):
-                rest = self._take(rest + data, client)
-        except OSError:
-            return
+        with client, suppress(OSError, ValueError):  # the connection is cut
+            while select.select([client], [], []):
+                with self._turn:
+                    if not (data := client.recv(4096)):
+                        self._client = None if self._client is client else self._client
+                        return
+                    rest = self._take(rest + data, client)
+
+    def settle(self) -> None:
+        """Wait until everything that was sent to this controller has been heard and answered."""
+        with suppress(OSError, ValueError):
+            while True:
+                with self._turn:
+                    if self._client is None or not select.select([self._client], [], [], 0.0)[0]:
+                        return
+                sleep(1e-4)
 
     def _take(self, data: bytes, client: socket.socket) -> bytes:
         line = b""
@@ -136,14 +174,10 @@ class Emulator:
         raise NotImplementedError
 
     def later(self, seconds: float, act: Callable[[], None]) -> None:
-        until_s = Time.now_s() + seconds
-
-        def wait() -> None:
-            while Time.now_s() < until_s:
-                sleep(0.001)
-            act()
-
-        threading.Thread(target=wait, daemon=True).start()
+        if Time.due is None:
+            threading.Timer(seconds, act).start()
+        else:
+            Time.due.append((Time.now_s() + seconds, act))
 
 
 class Grbl(Emulator):

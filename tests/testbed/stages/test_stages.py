@@ -19,12 +19,11 @@ from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.samples_csv import read_samples
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
-from fingervision.testbed.clocks.clock import VirtualClock
 from fingervision.testbed.device_kinds import kinds
 from fingervision.testbed.manual import manual_control
 from fingervision.testing import ActuatorContract, checks_of
 from fingervision.testing import run as failures
-from tests.testbed.stages.emulators import Time
+from tests.testbed.stages.emulators import EmulatorsClock, Time
 from tests.testbed.stages.recipe_process import run, started
 from tests.testbed.stages.stage_cases import CAMERA, CASES, Case
 
@@ -54,9 +53,10 @@ FEW, MANY = RECIPE.format(steps=2, frames=10), RECIPE.format(steps=9, frames=33)
 
 def virtual_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the next test beds and the emulators share a virtual clock, from now on."""
-    clock = VirtualClock(begin_s=time.monotonic())
+    clock = EmulatorsClock(begin_s=time.monotonic())
     monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: clock)
     monkeypatch.setattr(Time, "now_s", clock.now_s)
+    monkeypatch.setattr(Time, "due", [])
 
 
 @pytest.fixture(params=[pytest.param(name, marks=() if CASES[name].virtual else pytest.mark.slow) for name in CASES])
