@@ -10,8 +10,8 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.gripper_mechanism import check_outline, redrawn, whole_mechanism
 from fingervision.models.mechanism import Mechanism, check_mechanism
-from fingervision.storage.drawing_reader import DrawingReader, as_table
 from fingervision.storage.gripper_toml import read_gripper
+from fingervision.storage.toml_section import Section
 
 _TOP = ("schema", "name", "gripper")
 _TABLE = ("file", "left", "right")
@@ -33,21 +33,19 @@ def mechanism_from_gripper(tables: Mapping[str, Any], path: Path) -> Mechanism:
         A key is unknown, a value is not a number, or the drawing is not a valid mechanism.
     """
     origin = str(path)
-    reader = DrawingReader({}, origin)
-    reader.known(tables, _TOP, "the top level")
-    table = as_table(tables["gripper"], f"[gripper] in {origin}")
-    reader.known(table, _TABLE, "[gripper]")
-    file = table.get("file")
-    if not isinstance(file, str):
-        raise DataError(f"gripper.file in {origin} must name a gripper.toml beside it, but is {file!r}.")
-    gripper = read_gripper(path.parent / file)
+    top = Section(path, "", "", tables, names={})
+    top.only(_TOP)
+    table = top.table("gripper")
+    table.only(_TABLE)
+    gripper = read_gripper(path.parent / table.word("file"))
     halves, hinges = [], {}
     for side in ("left", "right"):
-        changes = _flat(as_table(table.get(side, {}), f"[gripper.{side}] in {origin}"))
+        half_table = table.table(side)
+        changes = replace(half_table, values=_flat(half_table.values))
         half = gripper
-        for key in changes:
+        for key in changes.values:
             what = f"gripper.{side}.{key}"
-            value = reader.positive(changes, key, f"gripper.{side}")
+            value = changes.number(key, above=0.0)
             section, _, name = key.partition(".")
             if section in _HINGES:
                 if name not in _OF_HINGE:

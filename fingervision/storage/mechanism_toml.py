@@ -1,51 +1,162 @@
 """The file mechanism.toml: drawing of any planar flexure mechanism; numbers may be expressions of its [lengths]."""
 
-import difflib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import hypot
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.field import Field, names_of
 from fingervision.domain.parameter import Estimate
 from fingervision.models.flexure import Flexure
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box, crosses_itself
 from fingervision.models.strips import strips_of
-from fingervision.storage.drawing_numbers import bare_tables, changed_tables, numbers_of
-from fingervision.storage.drawing_reader import DrawingReader, as_table, number
+from fingervision.storage.drawing_numbers import bare_tables, changed_tables, number, numbers_of
 from fingervision.storage.gripper_template import mechanism_from_gripper
 from fingervision.storage.gripper_toml import check_material, read_material
 from fingervision.storage.plain_file import toml_of
-from fingervision.storage.toml_section import DRAWINGS, read_document, refuse_other_file
+from fingervision.storage.toml_section import DRAWINGS, Section, read_document, refuse_other_file
 
-_TOP = (
-    "schema",
-    "name",
-    "plate_mm",
-    "material",
-    "lengths",
-    "body",
-    "flexure",
-    "fixed",
-    "slide",
-    "drive",
-    "probe",
-    "pair",
-    "contact",
-)
-_SHAPES = {"bar_mm": 4, "box_mm": 4, "disc_mm": 3, "ellipse_mm": 5}
-_DRIVE = (
-    "name", "box_mm", "pin_mm", "direction", "across", "turns", "per_input", "stiffness_n_mm", "force_n_per_input",
-)  # fmt: skip
 _FLEXURES = {
-    "circular": ("thickness_mm", "radius_mm"),
-    "elliptic": ("thickness_mm", "half_length_mm", "depth_mm"),
-    "filleted": ("thickness_mm", "half_length_mm", "depth_mm", "fillet_mm"),
-    "leaf": ("thickness_mm", "half_length_mm"),
+    "circular": ("radius_mm",),
+    "elliptic": ("half_length_mm", "depth_mm"),
+    "filleted": ("half_length_mm", "depth_mm", "fillet_mm"),
+    "leaf": ("half_length_mm",),
 }
+"""Sizes of each kind of flexure, beside its thickness."""
+_SHAPES = ("bar_mm", "box_mm", "disc_mm", "ellipse_mm", "polygon_mm")
+
+Point = tuple[float, float]
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class BodyTable:
+    """A table [[body]]: exactly one of its shapes is given."""
+
+    name: Annotated[str, Field("name of the body; its number by default")] = ""
+    cut: Annotated[bool, Field("`true` subtracts the shape")] = False
+    bar_mm: Annotated[Box | None, Field("bar: x and y of one end, and of the other end", "mm")] = None
+    width_mm: Annotated[float | None, Field("width of the bar", "mm", above=0.0)] = None
+    box_mm: Annotated[Box | None, Field("box: x from, x to, y from, y to", "mm")] = None
+    disc_mm: Annotated[tuple[float, float, float] | None, Field("disc: x, y, radius", "mm")] = None
+    ellipse_mm: Annotated[
+        tuple[float, float, float, float, float] | None,
+        Field("ellipse: x, y, two half axes, and the angle of the first (degrees)", "mm"),
+    ] = None
+    polygon_mm: Annotated[tuple[Point, ...] | None, Field("polygon: its corners in order", "mm")] = None
+
+
+@dataclass(frozen=True, slots=True)
+class FlexureTable:
+    """A table [[flexure]]: beside its thickness, the sizes of its kind."""
+
+    kind: Annotated[str, Field("`circular`, `elliptic`, `filleted` or `leaf`", of=tuple(_FLEXURES))]
+    at_mm: Annotated[Point, Field("centre of the flexure", "mm")]
+    axis_deg: Annotated[float, Field("angle of its axis from x", "degrees")]
+    thickness_mm: Annotated[float, Field("least thickness", "mm", above=0.0)]
+    name: Annotated[str, Field("name of the flexure; its number by default")] = ""
+    radius_mm: Annotated[float | None, Field("of a circular flexure: radius of the notches", "mm", above=0.0)] = None
+    half_length_mm: Annotated[float | None, Field("of other kinds: half its length", "mm", above=0.0)] = None
+    depth_mm: Annotated[
+        float | None, Field("of an elliptic or filleted flexure: depth of the notches", "mm", above=0.0)
+    ] = None
+    fillet_mm: Annotated[float | None, Field("of a filleted flexure: radius of the fillets", "mm", above=0.0)] = None
+
+
+@dataclass(frozen=True, slots=True)
+class FaceTable:
+    """A table [[fixed]]."""
+
+    box_mm: Annotated[Box, Field("box around the face: x from, x to, y from, y to", "mm")]
+    name: Annotated[str, Field("name of the face; its number by default")] = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlideTable(FaceTable):
+    """A table [[slide]]."""
+
+    holds: Annotated[str, Field("direction in which the face is held: `x` or `y`", of=("x", "y"))]
+
+
+@dataclass(frozen=True, slots=True)
+class ContactTable(FaceTable):
+    """A table [[contact]]."""
+
+    against_box_mm: Annotated[Box | None, Field("box around the other face", "mm")] = None
+    wall_mm: Annotated[Box | None, Field("or a rigid wall: x and y of two of its points", "mm")] = None
+
+
+@dataclass(frozen=True, slots=True)
+class DriveTable:
+    """A table [drive], or several [[drive]]."""
+
+    direction: Annotated[Point, Field("direction of the motion: x and y of a vector")]
+    box_mm: Annotated[Box | None, Field("box around the driven face: x from, x to, y from, y to", "mm")] = None
+    pin_mm: Annotated[
+        tuple[float, float, float] | None,
+        Field("or a pin: x, y and diameter of a circle within which the mean of the body is driven; it may turn", "mm"),
+    ] = None
+    name: Annotated[str, Field("name of the drive; its number by default")] = ""
+    across: Annotated[
+        str, Field("`held`, guided as by a stage, or `free`, may slide; held by default", of=("held", "free"))
+    ] = "held"
+    turns: Annotated[
+        str | None,
+        Field(
+            "`free`: a rod or pin moves the face in the mean, and the face may turn; `held`: every point of it moves "
+            "alike (a clamp or a flat plate); as `across` by default, and `free` with a pin",
+            of=("held", "free"),
+        ),
+    ] = None
+    per_input: Annotated[float, Field("displacement per input; 1 by default", "mm/mm")] = 1.0
+    stiffness_n_mm: Annotated[
+        float | None,
+        Field("stiffness of the actuator, behind which the input is the actuator's own motion", "N/mm", above=0.0),
+    ] = None
+    force_n_per_input: Annotated[
+        float | None,
+        Field(
+            "force on the face per input, instead of a motion; with a stiffness, it decreases as the face moves", "N",
+            above=0.0,
+        ),
+    ] = None  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class ProbeTable:
+    """A table [[probe]]."""
+
+    at_mm: Annotated[Point, Field("point whose motion is observed", "mm")]
+    name: Annotated[str, Field("name of the point")] = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PairTable:
+    """A table [[pair]]."""
+
+    of: Annotated[tuple[str, str], Field("names of two probes, whose distance is a gap")]
+    name: Annotated[str, Field("name of the pair")] = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MechanismFile:
+    """The file mechanism.toml, without its tables [material] and [lengths]."""
+
+    plate_mm: Annotated[float, Field("thickness of the plate", "mm", above=0.0)]
+    body: Annotated[tuple[BodyTable, ...], Field("bodies, in the order in which they are added or cut")]
+    drive: Annotated[tuple[DriveTable, ...], Field("driven faces")]
+    schema: Annotated[int, Field("1", low=1, high=1)] = 1
+    name: Annotated[str | None, Field("name of the mechanism; that of its file by default")] = None
+    flexure: Annotated[tuple[FlexureTable, ...], Field("flexures")] = ()
+    fixed: Annotated[tuple[FaceTable, ...], Field("fixed faces")] = ()
+    slide: Annotated[tuple[SlideTable, ...], Field("faces that are held in one direction")] = ()
+    probe: Annotated[tuple[ProbeTable, ...], Field("observed points")] = ()
+    pair: Annotated[tuple[PairTable, ...], Field("pairs of points, each with a gap")] = ()
+    contact: Annotated[tuple[ContactTable, ...], Field("faces that may touch each other, or a wall")] = ()
 
 
 def is_mechanism(path: Path) -> bool:
@@ -98,14 +209,9 @@ class MechanismDrawing:
         """
         changed_tables(self.tables, {name: 0.0}, str(self.path))
         raw = numbers_of(self.tables)[name]
-        return number(raw, self._lengths, f"{name} in {self.path}") if isinstance(raw, str) else raw
-
-    @property
-    def _lengths(self) -> dict[str, float]:
-        lengths: dict[str, float] = {}
-        for name, raw in as_table(self.tables.get("lengths", {}), f"[lengths] in {self.path}").items():
-            lengths[name] = number(raw, lengths, f"lengths.{name} in {self.path}")
-        return lengths
+        if not isinstance(raw, str):
+            return raw
+        return number(raw, _lengths(self.tables, str(self.path)), f"{name} in {self.path}")
 
     @property
     def estimates(self) -> dict[str, Estimate]:
@@ -140,218 +246,172 @@ def read_mechanism(path: Path) -> Mechanism:
 
 def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
     """Build and check a mechanism from its tables; errors name the file `origin`."""
-    for key in tables:
-        if key not in _TOP:
-            near = difflib.get_close_matches(key, _TOP, 1, cutoff=0.0)[0]
-            raise DataError(f"{origin} has an unknown section or key, {key}; did you mean {near}?")
-    if tables.get("schema", 1) != 1:
-        raise DataError(f"schema in {origin} must be 1, but is {tables['schema']!r}.")
-    lengths: dict[str, float] = {}
-    for name, raw in as_table(tables.get("lengths", {}), f"[lengths] in {origin}").items():
-        lengths[name] = number(raw, lengths, f"lengths.{name} in {origin}")
-    reader = _Reader(lengths, origin)
+    lengths = _lengths(tables, origin)
+    drive = tables.get("drive")
+    values = {
+        **{key: value for key, value in tables.items() if key not in ("material", "lengths")},
+        "drive": [{"name": "drive", **drive}] if isinstance(drive, dict) else drive or [],
+    }
+    top = Section(Path(origin), "", "", values, names=lengths)
+    top.only([*names_of(MechanismFile), "material", "lengths"])
     material = read_material(tables, origin)
+    file = top.record(MechanismFile)
+
+    def each(key: str, read: Callable[[Section, Any, str], Any]) -> list[Any]:
+        pairs = zip(top.tables(key), getattr(file, key), strict=True)
+        return [read(section, table, table.name or f"{key} {k}") for k, (section, table) in enumerate(pairs, 1)]
+
+    for key in ("flexure", "probe", "pair", "contact", "drive"):
+        _refuse_same_names(top, key)
     mechanism = Mechanism(
-        name=str(tables.get("name", origin)),
+        name=origin if file.name is None else file.name,
         material=material,
-        plate_mm=reader.positive(tables, "plate_mm", ""),
-        bodies=tuple(
-            step for i, table in enumerate(reader.sections(tables, "body"), 1) for step in reader.body(table, i)
-        ),
-        flexures=tuple(reader.flexure(t, i) for i, t in enumerate(reader.sections(tables, "flexure", least=0), 1)),
-        fixed=tuple(reader.face(t, f"fixed {i}") for i, t in enumerate(reader.sections(tables, "fixed", least=0), 1)),
-        slides=tuple(reader.slide(t, i) for i, t in enumerate(reader.sections(tables, "slide", least=0), 1)),
-        drives=reader.drives(tables),
-        probes={name: p for t in reader.sections(tables, "probe", least=0) for name, p in [reader.probe(t)]},
+        plate_mm=file.plate_mm,
+        bodies=tuple(each("body", _body)),
+        flexures=tuple(each("flexure", _flexure)),
+        fixed=tuple(each("fixed", _face)),
+        slides=tuple(zip(each("slide", _face), [slide.holds for slide in file.slide], strict=True)),
+        drives=tuple(each("drive", _drive)),
+        probes={probe.name: probe.at_mm for probe in file.probe},
         pairs={},
-        body_names=tuple(str(table.get("name", "")) for table in reader.sections(tables, "body")),
-        contacts=tuple(reader.contact(t, i) for i, t in enumerate(reader.sections(tables, "contact", least=0), 1)),
+        body_names=tuple(body.name for body in file.body),
+        contacts=tuple(each("contact", _contact)),
     )
-    pairs = {name: ends for t in reader.sections(tables, "pair", least=0) for name, ends in [reader.pair(t, mechanism)]}
-    mechanism.pairs.update(pairs)
+    if not any(drive.per_input for drive in mechanism.drives):
+        raise DataError(f"At least one drive of {origin} must move with the input, but per_input is 0 for all of them.")
+    mechanism.pairs.update(each("pair", lambda section, pair, _: (pair.name, _ends(section, pair, mechanism.probes))))
     with_strips = (*mechanism.flexures, *strips_of(mechanism.region, mechanism.flexures))
     mechanism = replace(mechanism, flexures=with_strips)
-    _refuse_same_names(tables, reader)
     check_material(material, origin)
     check_mechanism(mechanism, mechanism.region)
     return mechanism
 
 
-def _refuse_same_names(tables: Mapping[str, Any], reader: "_Reader") -> None:
-    """Refuse two flexures, probes, pairs or contacts of one name: results by name would be those of one of them."""
-    for section in ("flexure", "probe", "pair", "contact"):
-        places: dict[str, int] = {}
-        for place, table in enumerate(reader.sections(tables, section, least=0), 1):
-            name = str(table.get("name", f"{section} {place}"))
-            if name in places:
-                raise DataError(
-                    f"Every [[{section}]] of {reader.origin} must have a name of its own, but numbers {places[name]} "
-                    f"and {place} are both called {name}; rename one of them."
-                )
-            places[name] = place
+def _lengths(tables: Mapping[str, Any], origin: str) -> dict[str, float]:
+    """Values of the names in [lengths], of which each may use those above it."""
+    lengths: dict[str, float] = {}
+    for name, raw in Section(Path(origin), "", "", tables).table("lengths").values.items():
+        lengths[name] = number(raw, lengths, f"lengths.{name} in {origin}")
+    return lengths
 
 
-class _Reader(DrawingReader):
-    def body(self, table: Mapping[str, Any], place: int) -> list[tuple[bool, Shape]]:
-        what = f"body {table.get('name', place)}"
-        self.known(table, ("name", "cut", "width_mm", "polygon_mm", *_SHAPES), what)
-        given = [key for key in (*_SHAPES, "polygon_mm") if key in table]
-        if len(given) != 1:
+def _refuse_same_names(top: Section, key: str) -> None:
+    """Refuse two flexures, probes, pairs, contacts or drives of one name: results by name would be those of one."""
+    places: dict[str, int] = {}
+    for place, section in enumerate(top.tables(key), 1):
+        name = section.values.get("name", f"{key} {place}")
+        if name in places:
             raise DataError(
-                f"{what} in {self.origin} must have exactly one of {', '.join((*_SHAPES, 'polygon_mm'))}, but has "
-                f"{' and '.join(given) or 'none'}."
+                f"Every [[{key}]] of {top.path} must have a name of its own, but numbers {places[name]} and {place} "
+                f"are both called {name}; rename one of them."
             )
-        if not isinstance(table.get("cut", False), bool):
-            raise DataError(f"{what}.cut in {self.origin} must be true or false, but is {table['cut']!r}.")
-        added = not table.get("cut", False)
-        return [(added, self._shape(table, given[0], what))]
+        places[name] = place
 
-    def _shape(self, table: Mapping[str, Any], key: str, what: str) -> Shape:
-        if key == "polygon_mm":
-            raw = table[key]
-            if not isinstance(raw, list) or len(raw) < 3:
-                raise DataError(f"{what}.polygon_mm in {self.origin} must be three points or more, but is {raw!r}.")
-            points = [self.numbers({"polygon_mm": point}, "polygon_mm", 2, what) for point in raw]
-            corners = tuple((x, y) for x, y in points)
-            if len(set(corners)) < len(corners) or crosses_itself(corners):
-                raise DataError(
-                    f"{what}.polygon_mm in {self.origin} must go round without crossing itself, but does not; put "
-                    "its points in order, each once."
-                )
-            return Polygon(corners)
-        values = self.numbers(table, key, _SHAPES[key], what)
-        if key == "bar_mm":
-            width_mm = self.positive(table, "width_mm", what)
-            if hypot(values[2] - values[0], values[3] - values[1]) == 0.0:
-                raise DataError(f"{what}.bar_mm in {self.origin} must have two different end points, but has not.")
-            return bar(values[0], values[1], values[2], values[3], width_mm)
-        if key == "box_mm":
-            return box(*self.grown(values, f"{what}.box_mm"))
-        radii = (values[2], values[2]) if key == "disc_mm" else (values[2], values[3])
-        if min(radii) <= 0.0:
-            raise DataError(f"{what}.{key} in {self.origin} must have positive radii, but has {min(radii):g}.")
-        return Ellipse((values[0], values[1]), radii, values[4] if key == "ellipse_mm" else 0.0)
 
-    def flexure(self, table: Mapping[str, Any], place: int) -> Flexure:
-        name = str(table.get("name", place))
-        what = f"flexure {name}"
-        kind = table.get("kind")
-        if kind not in _FLEXURES:
-            raise DataError(f"{what}.kind in {self.origin} must be one of {', '.join(_FLEXURES)}, but is {kind!r}.")
-        self.known(table, ("name", "kind", "at_mm", "axis_deg", *_FLEXURES[kind]), what)
-        at = self.numbers(table, "at_mm", 2, what)
-        values = {key: self.positive(table, key, what) for key in _FLEXURES[kind]}
-        if "radius_mm" in values:
-            values["half_length_mm"] = values["depth_mm"] = values.pop("radius_mm")
-        if values.get("fillet_mm", 0.0) > min(values["half_length_mm"], values.get("depth_mm", 0.0) or 1e300):
-            raise DataError(
-                f"{what}.fillet_mm in {self.origin} must be at most half_length_mm and depth_mm, but is "
-                f"{values['fillet_mm']:g}."
-            )
-        return Flexure(
-            name, kind, (at[0], at[1]), self.value(table, "axis_deg", what), values["thickness_mm"],
-            values["half_length_mm"], values.get("depth_mm", 0.0), values.get("fillet_mm", 0.0),
+def _body(section: Section, body: BodyTable, name: str) -> tuple[bool, Shape]:
+    given = [key for key in _SHAPES if getattr(body, key) is not None]
+    if len(given) != 1:
+        section.refuse(None, f"must have exactly one of {', '.join(_SHAPES)}, but has {' and '.join(given) or 'none'}.")
+    return not body.cut, _shape(section, body, given[0])
+
+
+def _shape(section: Section, body: BodyTable, key: str) -> Shape:
+    if body.polygon_mm is not None:
+        corners = body.polygon_mm
+        if len(corners) < 3 or len(set(corners)) < len(corners) or crosses_itself(corners):
+            words = "must go round three points or more without crossing itself, but does not; put its points in order"
+            section.refuse(key, f"{words}, each once.")
+        return Polygon(corners)
+    if body.bar_mm is not None:
+        x0, y0, x1, y1 = body.bar_mm
+        if (x0, y0) == (x1, y1):
+            section.refuse(key, "must have two different end points, but has not.")
+        return bar(x0, y0, x1, y1, section.number("width_mm", above=0.0))
+    if body.box_mm is not None:
+        return box(*_grown(section, key, body.box_mm))
+    x, y, *radii, turned_deg = body.ellipse_mm or (*(body.disc_mm or ()), 0.0)
+    if min(radii) <= 0.0:
+        section.refuse(key, f"must have positive radii, but has {min(radii):g}.")
+    return Ellipse((x, y), (radii[0], radii[-1]), turned_deg)
+
+
+def _grown(section: Section, key: str, limits: Box, *, flat: bool = False) -> Box:
+    """Check a rectangle given by its limits; with `flat`, its width or height may be zero."""
+    x0, x1, y0, y1 = limits
+    if not (x1 >= x0 and y1 >= y0 if flat else x1 > x0 and y1 > y0):
+        section.refuse(
+            key, "must be [x from, x to, y from, y to], each range from the smaller to the larger number, but is "
+            f"[{x0:g}, {x1:g}, {y0:g}, {y1:g}]."
         )  # fmt: skip
+    return limits
 
-    def face(self, table: Mapping[str, Any], what: str) -> Face:
-        name = str(table.get("name", what))
-        return Face(name, self.grown(self.numbers(table, "box_mm", 4, what), f"{what}.box_mm", flat=True))
 
-    def slide(self, table: Mapping[str, Any], place: int) -> tuple[Face, str]:
-        if table.get("holds") not in ("x", "y"):
-            raise DataError(f"slide {place}.holds in {self.origin} must be x or y, but is {table.get('holds')!r}.")
-        return self.face(table, f"slide {place}"), table["holds"]
+def _flexure(section: Section, table: FlexureTable, name: str) -> Flexure:
+    kind: Any = table.kind  # one of the words that its field allows
+    sizes = _FLEXURES[kind]
+    for key in ("radius_mm", "half_length_mm", "depth_mm", "fillet_mm"):
+        if (getattr(table, key) is not None) != (key in sizes):
+            said = f"must be {'given' if key in sizes else 'left out'}"
+            section.refuse(key, f"{said}: a flexure of the kind {table.kind} has thickness_mm, {', '.join(sizes)}.")
+    half_length_mm = table.half_length_mm or table.radius_mm or 0.0
+    depth_mm, fillet_mm = table.depth_mm or table.radius_mm or 0.0, table.fillet_mm or 0.0
+    if fillet_mm > min(half_length_mm, depth_mm or fillet_mm):
+        section.refuse("fillet_mm", f"must be at most half_length_mm and depth_mm, but is {fillet_mm:g}.")
+    return Flexure(
+        table.name or name.removeprefix("flexure "), kind, table.at_mm, table.axis_deg, table.thickness_mm,
+        half_length_mm, depth_mm, fillet_mm,
+    )  # fmt: skip
 
-    def contact(self, table: Mapping[str, Any], place: int) -> Contact:
-        name = str(table.get("name", f"contact {place}"))
-        what = f"contact {name}"
-        self.known(table, ("name", "box_mm", "against_box_mm", "wall_mm"), what)
-        if ("against_box_mm" in table) == ("wall_mm" in table):
-            raise DataError(
-                f"{what} in {self.origin} must have either against_box_mm (the other face) or wall_mm (two points of a "
-                f"rigid wall), but has {'both' if 'wall_mm' in table else 'none'}."
-            )
-        face = self.face({**table, "name": name}, what)
-        if "wall_mm" in table:
-            x0, y0, x1, y1 = self.numbers(table, "wall_mm", 4, what)
-            if hypot(x1 - x0, y1 - y0) == 0.0:
-                raise DataError(f"{what}.wall_mm in {self.origin} must be two different points, but both are the same.")
-            return Contact(name, face, None, ((x0, y0), (x1, y1)))
-        box_mm = self.grown(self.numbers(table, "against_box_mm", 4, what), f"{what}.against_box_mm", flat=True)
-        return Contact(name, face, Face(f"{name}, other face", box_mm))
 
-    def drives(self, tables: Mapping[str, Any]) -> tuple[Drive, ...]:
-        """Read [drive], or several [[drive]] sections."""
-        raw = tables.get("drive")
-        if raw is None:
-            raise DataError(f"{self.origin} must have a driven face, [drive] or several [[drive]], but has none.")
-        if not isinstance(raw, list):
-            return (self.drive(as_table(raw, f"[drive] in {self.origin}"), "drive"),)
-        found = tuple(
-            self.drive({"name": f"drive {place}", **table}, f"drive {table.get('name', place)}")
-            for place, table in enumerate(self.sections(tables, "drive"), 1)
-        )
-        names = [drive.face.name for drive in found]
-        for name in names:
-            if names.count(name) > 1:
-                raise DataError(
-                    f"The drives of {self.origin} must have different names, but {names.count(name)} are called {name}."
-                )
-        if not any(drive.per_input for drive in found):
-            raise DataError(
-                f"At least one drive of {self.origin} must move with the input, but per_input is 0 for all of them."
-            )
-        return found
+def _face(section: Section, table: FaceTable, name: str) -> Face:
+    return Face(name, _grown(section, "box_mm", table.box_mm, flat=True))
 
-    def drive(self, table: Mapping[str, Any], what: str) -> Drive:
-        self.known(table, _DRIVE, what)
-        x, y = self.numbers(table, "direction", 2, what)
-        across = table.get("across", "held")
-        if hypot(x, y) == 0.0:
-            raise DataError(f"{what}.direction in {self.origin} must be a vector such as [1, 0], but is [0, 0].")
-        if across not in ("held", "free") or (across == "free" and x * y != 0.0):
-            raise DataError(
-                f"{what}.across in {self.origin} must be 'held', or 'free' if {what}.direction is along x or "
-                f"y, but is {across!r}."
-            )
-        turns = table.get("turns", "free" if "pin_mm" in table else across)
-        if turns not in ("held", "free"):
-            raise DataError(
-                f"{what}.turns in {self.origin} must be 'free' (a rod or a pin: the face may turn) or 'held' (a clamp "
-                f"or a flat plate), but is {turns!r}."
-            )
-        per_input = self.value({"per_input": 1.0, **table}, "per_input", what)
-        own = [self.positive(table, key, what) if key in table else None
-               for key in ("stiffness_n_mm", "force_n_per_input")]  # fmt: skip
-        return Drive(
-            self.driven(table, what, turns), (x / hypot(x, y), y / hypot(x, y)), across, per_input, turns, *own
-        )
 
-    def driven(self, table: Mapping[str, Any], what: str, turns: str) -> Face:
-        """Read the face or the pin of a drive."""
-        if "pin_mm" not in table:
-            return self.face(table, what)
-        if "box_mm" in table:
-            raise DataError(f"{what} in {self.origin} must have either box_mm (a face) or pin_mm, but has both.")
-        x, y, diameter = self.numbers(table, "pin_mm", 3, what)
-        if diameter <= 0.0:
-            raise DataError(f"{what}.pin_mm in {self.origin} must be [x, y, diameter > 0], but is {table['pin_mm']!r}.")
-        if turns == "held":
-            raise DataError(f'{what}.turns in {self.origin} must be "free", as a pin does not hold a rotation.')
-        half = 0.5 * diameter
-        return Face(str(table.get("name", what)), (x - half, x + half, y - half, y + half), is_pin=True)
+def _contact(section: Section, table: ContactTable, name: str) -> Contact:
+    face, wall, other = _face(section, table, name), table.wall_mm, table.against_box_mm
+    if wall is not None and other is None:
+        if wall[:2] == wall[2:]:
+            section.refuse("wall_mm", "must be two different points, but both are the same.")
+        return Contact(name, face, None, (wall[:2], wall[2:]))
+    if other is None or wall is not None:
+        section.refuse(
+            None, "must have either against_box_mm (the other face) or wall_mm (two points of a rigid wall), but has "
+            f"{'both' if wall is not None else 'none'}."
+        )  # fmt: skip
+    return Contact(name, face, Face(f"{name}, other face", _grown(section, "against_box_mm", other, flat=True)))
 
-    def probe(self, table: Mapping[str, Any]) -> tuple[str, tuple[float, float]]:
-        name = str(table.get("name", ""))
-        x, y = self.numbers(table, "at_mm", 2, f"probe {name}")
-        return name, (x, y)
 
-    def pair(self, table: Mapping[str, Any], mechanism: Mechanism) -> tuple[str, tuple[str, str]]:
-        name, of = str(table.get("name", "")), table.get("of")
-        ends = [end for end in of if isinstance(end, str) and end in mechanism.probes] if isinstance(of, list) else []
-        if len(ends) != 2 or ends != of or mechanism.probes[ends[0]] == mechanism.probes[ends[1]]:
-            raise DataError(
-                f"pair {name}.of in {self.origin} must be two of the probes {', '.join(mechanism.probes)} at different "
-                f"places, but is {of!r}."
-            )
-        return name, (ends[0], ends[1])
+def _drive(section: Section, table: DriveTable, name: str) -> Drive:
+    x, y = table.direction
+    if hypot(x, y) == 0.0:
+        section.refuse("direction", "must be a vector such as [1, 0], but is [0, 0].")
+    if table.across == "free" and x * y != 0.0:
+        section.refuse("across", "must be 'held', or 'free' if direction is along x or y, but is 'free'.")
+    way = (x / hypot(x, y), y / hypot(x, y))
+    across: Any = table.across  # words that their fields allow
+    turns: Any = table.turns or (across if table.pin_mm is None else "free")
+    face = _driven(section, table, name, turns)
+    return Drive(face, way, across, table.per_input, turns, table.stiffness_n_mm, table.force_n_per_input)
+
+
+def _driven(section: Section, table: DriveTable, name: str, turns: str) -> Face:
+    """Read the face or the pin of a drive."""
+    if table.box_mm is not None and table.pin_mm is None:
+        return Face(name, _grown(section, "box_mm", table.box_mm, flat=True))
+    if table.box_mm is not None or table.pin_mm is None:
+        given = "none" if table.box_mm is None else "both"
+        section.refuse(None, f"must have either box_mm (a face) or pin_mm, but has {given}.")
+    x, y, diameter = table.pin_mm
+    if diameter <= 0.0:
+        section.refuse("pin_mm", f"must be [x, y, diameter > 0], but is [{x:g}, {y:g}, {diameter:g}].")
+    if turns == "held":
+        section.refuse("turns", 'must be "free", as a pin does not hold a rotation.')
+    half = 0.5 * diameter
+    return Face(name, (x - half, x + half, y - half, y + half), is_pin=True)
+
+
+def _ends(section: Section, pair: PairTable, probes: Mapping[str, Point]) -> tuple[str, str]:
+    places, known = [probes.get(end) for end in pair.of], ", ".join(probes)
+    if None in places or places[0] == places[1]:
+        section.refuse("of", f"must be two of the probes {known} at different places, but is {list(pair.of)}.")
+    return pair.of

@@ -4,13 +4,14 @@ import difflib
 import re
 import tomllib
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, get_args, get_origin
 
 from fingervision.domain.errors import DataError, InputFileError
 from fingervision.domain.field import Declared, Field, declared
+from fingervision.storage.drawing_numbers import number
 from fingervision.storage.number_columns import is_number
 from fingervision.storage.plain_file import NotUtf8Error, parsed, text_of
 
@@ -136,6 +137,8 @@ class Section:
         its dotted name.
     is_open : bool
         Whether other programs may add keys, which are then ignored.
+    names : mapping of str to float, or None
+        Where not None, a number may be an arithmetic expression of these names.
     """
 
     path: Path
@@ -145,6 +148,7 @@ class Section:
     place: int = 0
     uncertainties: dict[str, float] | None = None
     is_open: bool = False
+    names: Mapping[str, float] | None = None
 
     def at(self, key: str | None = None) -> str:
         """Location of a key: `line 12 of recipe.toml`; the file alone if its text is not known."""
@@ -193,7 +197,9 @@ class Section:
         return value
 
     def _number(self, key: str, value: Any, field: Field) -> float:
-        if not is_number(value):
+        if self.names is not None:
+            value = number(value, self.names, f"{self.dotted(key)} in {self.path}")
+        elif not is_number(value):
             self.refuse(key, f"must be a number, but is {value!r}.")
         if (words := field.refusal(value)) is not None:
             self.refuse(key, f"{words}.")
@@ -232,14 +238,19 @@ class Section:
         return self._inner(key, value, self.place)
 
     def _inner(self, key: str, values: Mapping[str, Any], place: int) -> "Section":
-        return Section(self.path, self.text, self.dotted(key), values, place, self.uncertainties, self.is_open)
+        return replace(self, header=self.dotted(key), values=values, place=place)
 
     def tables(self, key: str) -> tuple["Section", ...]:
         """Read the sub-tables `[[key]]`, in order."""
         value = self.values.get(key, [])
         if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
             self.refuse(key, f"must be tables [[{key}]], but is {value!r}.")
-        return tuple(self._inner(key, each, place) for place, each in enumerate(value))
+        # Without a text, whose lines tell them apart, tables are told by their names or numbers.
+        is_named = not self.text and len(value) > 1
+        return tuple(
+            self._inner(f"{key} {each.get('name', place + 1)}" if is_named else key, each, place)
+            for place, each in enumerate(value)
+        )
 
     def record(self, kind: type[Record]) -> Record:
         """Read the table as a record (a dataclass) whose declared fields are its keys; nested records are sub-tables.
@@ -265,7 +276,10 @@ class Section:
                 self.refuse(None, f"must have a section [{self.dotted(key)}], but has none.")
             return self.table(key).record(nested)
         if get_origin(kind) is tuple and is_dataclass(inner):
-            return tuple(section.record(nested) for section in self.tables(key))
+            sections = self.tables(key)
+            if each.is_required and not sections:
+                self.refuse(None, f"must have at least one [[{key}]], but has none: add one.")
+            return tuple(section.record(nested) for section in sections)
         if field.shape:
             return self.array(key, field.shape)
         if get_origin(kind) is tuple:
@@ -321,15 +335,19 @@ class Section:
         if isinstance(value, dict) and self.uncertainties is not None:
             self.refuse(key, "is a list and can have no uncertainty: state it at a single number.")
         if not isinstance(value, list) or len(value) != len(inner):
-            self.refuse(key, f"must be a list of {len(inner)} numbers, but is {value!r}.")
+            self.refuse(
+                key, f"must be a list of {len(inner)} {'words' if str in inner else 'numbers'}, but is {value!r}."
+            )
         return tuple(self._one(key, each, one, field) for one, each in zip(inner, value, strict=True))
 
     def _one(self, key: str, value: Any, kind: Any, field: Field) -> Any:
-        """Read a number of a kind."""
-        number = self._number(key, value, field)
-        if kind is int and number != int(number):
+        """Read a number of a kind, or a word of a list."""
+        if kind is str:
+            return replace(self, values={key: value}).word(key)
+        found = self._number(key, value, field)
+        if kind is int and found != int(found):
             self.refuse(key, f"must be a whole number, but is {value:g}.")
-        return kind(number)
+        return kind(found)
 
 
 def read_section(

@@ -9,7 +9,7 @@ import matplotlib as mpl
 import pytest
 
 from fingervision.domain.status import Status
-from fingervision.storage import mechanism_toml, response_csv
+from fingervision.storage import response_csv
 from fingervision.testbed import recipe_kinds
 
 ROOT = Path(__file__).parents[2]
@@ -32,7 +32,6 @@ def keys_in(*paths: str) -> set[str]:
         ("response.csv", set(response_csv.COLUMNS)),
         ("report.json", keys_in("fingervision/storage/report_json.py")),
         ("calibration.json", keys_in("fingervision/storage/calibration_json.py") - {"tilt", "value", "stated"}),
-        ("mechanism.toml", {*mechanism_toml._TOP, *mechanism_toml._SHAPES, *mechanism_toml._FLEXURES}),
     ],
 )
 def test_every_key_stands_in_the_reference(what: str, keys: set[str]) -> None:

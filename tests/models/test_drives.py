@@ -122,7 +122,7 @@ def test_the_ends_of_a_face_do_not_make_the_frame_jump(tmp_path: Path) -> None:
 
 
 def test_what_a_drive_cannot_do_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"turns .* must be 'free' .* but is 'often'"):
+    with pytest.raises(DataError, match=r"turns in .* but is 'often'"):
         lever(tmp_path, "40, 50, 10, 10", 'turns = "often"')
 
 

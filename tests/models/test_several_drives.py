@@ -129,7 +129,7 @@ WRONG = [
     ("per_input = -0.5", "per_input = 1e300", "drive upper.per_input"),
     ("per_input = -0.5", "per_inputs = -0.5", "did you mean per_input?"),
     ("per_input = -0.5", "per_input = [1, 2]", "drive upper.per_input"),
-    ('name = "upper"', 'name = "lower"', "must have different names, but 2 are called lower"),
+    ('name = "upper"', 'name = "lower"', "numbers 1 and 2 are both called lower"),
     (LOWER, LOWER + "[[drive]]\n" + LOWER.replace('"lower"', '"third"'), "must be apart, but share a part"),
     ("box_mm = [7, 14, 30, 30]", "box_mm = [7, 14, 31, 31]", "must hold a part of the outline"),
     ("box_mm = [7, 14, 30, 30]", "box_mm = [-6, 6, 0, 0]", "is fixed too"),
@@ -137,7 +137,7 @@ WRONG = [
     ("direction = [1.0, 0.0]", "direction = [0.0, 0.0]", "drive lower.direction"),
     ("direction = [1.0, 0.0]", "direction = [1.0]", "drive lower.direction"),
     ('across = "free"', 'across = "guided"', "drive lower.across"),
-    ("direction = [1.0, 0.0]", "direction = [1.0, 1.0]", "drive lower.direction is along x or"),
+    ("direction = [1.0, 0.0]", "direction = [1.0, 1.0]", "drive lower.across in"),
 ]
 
 

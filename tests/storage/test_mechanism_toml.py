@@ -13,7 +13,7 @@ from fingervision.domain.errors import DataError, FingervisionError, ModelError,
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_figures import response_figures
-from fingervision.storage.drawing_reader import number
+from fingervision.storage.drawing_numbers import number
 from fingervision.storage.mechanism_toml import is_mechanism, mechanism_from_tables, read_mechanism
 
 ROOT = Path(__file__).parents[2]
@@ -54,7 +54,7 @@ WRONG = [
     ('at_mm = [0.0, "leaf + block / 2"]', "at_mm = [500.0, 0.0]", "probe stage"),
     ('of = ["ground", "stage"]', 'of = ["ground", "moon"]', "two of the probes"),
     ("[[fixed]]", "[[fixt]]", "did you mean fixed?"),
-    ('name = "ground"\nbox_mm', 'name = "ground"\nwide = 3\nbox_mm', "unknown key, wide"),
+    ('name = "ground"\nbox_mm', 'name = "ground"\nwide = 3\nbox_mm', "ground.wide in m.toml is not known"),
     ('turns = "held"', 'turns = "maybe"', "drive.turns"),
     ('name = "right"', 'name = "left"', "numbers 1 and 2 are both called left"),
     (
@@ -224,12 +224,12 @@ WRONG_TEMPLATES = [
     ('"gripper.toml"', '"nowhere.toml"', "nowhere.toml"),
     ("hinge1.thickness_mm", "hinge3.thickness_mm", "gripper.left.hinge3.thickness_mm"),
     ("hinge1.thickness_mm", "hinge1.height_mm", "thickness_mm and radius_mm"),
-    ("= 0.9", "= -0.9", "must be positive, but is -0.9"),
+    ("= 0.9", "= -0.9", "must be greater than 0, but is -0.9"),
     ("= 0.9", "= nan", "must be a number"),
     ("= 0.9", '= "thin"', "arithmetic expression with names"),
     ("= 0.9", "= 9.0", "thickness of 9 mm"),
     ("l2_mm = 18.0", "l3_mm = 18.0", "the same in both halves"),
-    ("[gripper.left]", "[gripper.middle]", "unknown key, middle"),
+    ("[gripper.left]", "[gripper.middle]", "middle in"),
 ]
 
 
