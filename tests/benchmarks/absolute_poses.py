@@ -10,7 +10,6 @@ perspective that the calibration knows. With `lossy` the pictures are JPEG of qu
 another level lies over a part of a moving body.
 """
 
-import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -29,6 +28,7 @@ from fingervision.measuring.drawing_placement import GivenPoint
 from fingervision.measuring.scale import Scale
 from fingervision.storage.mechanism_toml import mechanism_from_tables
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings
+from tests.benchmarks.options import options_of
 from tests.diagnosis.lever_drawing import TABLES
 
 Array = NDArray[np.float64]
@@ -169,11 +169,9 @@ def scale_of(kind: str, rng: np.random.Generator) -> tuple[Scale, float, float]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the coverage of every kind."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=60)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--kinds", nargs="+", default=["bare", "calibrated", "lens", "lossy"])
-    given = parser.parse_args(arguments)
+    given = options_of(
+        __doc__, arguments, cases=60, seed=1, kinds={"nargs": "+", "default": ["bare", "calibrated", "lens", "lossy"]}
+    )
     centroids = {name: centroid(name) for name in BOXES}
     for kind in given.kinds:
         rng = np.random.default_rng([given.seed, len(kind)])

@@ -1,13 +1,12 @@
 """Error and coverage of the gap on rendered fingers, class by class.
 
-    python tests/benchmarks/accuracy.py [--frames 200] [--seed 1] [--only NAME]
+    python -m tests.benchmarks.accuracy [--frames 200] [--seed 1] [--only NAME]
 
 Every class draws its frames at random: sub-pixel positions uniform, everything else as the class says. Columns: RMS,
 mean and largest error of `gap_px`; share of frames with a value; share of errors beyond 0.25 px; share of errors within
 one and within two of the stated `u_gap_px`, which must be 68 and 95 %.
 """
 
-import argparse
 import io
 import time
 from collections.abc import Callable, Iterator
@@ -25,6 +24,7 @@ from fingervision.domain.quantiser import Quantiser
 from fingervision.frames.video_file import VideoFile
 from fingervision.rendering import Camera, Light, Scene, SquareTip, render, truth, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
+from tests.benchmarks.options import options_of
 
 PX_PER_MM = 34.0
 BELOW_PX = 0.3 * PX_PER_MM
@@ -219,11 +219,7 @@ def run(name: str, frames: int, seed: int) -> tuple[str, np.ndarray, np.ndarray]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--frames", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="*")
-    options = parser.parse_args()
+    options = options_of(__doc__, frames=200, seed=1, only={"nargs": "*"})
     print("class           frames   RMS px    mean px   max px  value% >.25%  median u  <1u %  <2u %  ms")
     within = []
     for name in options.only or [*SINGLE, "h264"]:

@@ -1,6 +1,6 @@
 """Rates, memory and costs of a batch; prints tables, asserts nothing.
 
-Run as `python tests/benchmarks/batch.py [--recordings 12] [--frames 1500] [--finished 10000]` on an idle machine
+Run as `python -m tests.benchmarks.batch [--recordings 12] [--frames 1500] [--finished 10000]` on an idle machine
 (some minutes). Each line is a figure, with its bar where it has one.
 
 * Workers: the same recordings (H.264, 640x480) with one worker and with two, alternating, three rounds; frames a second
@@ -10,7 +10,6 @@ Run as `python tests/benchmarks/batch.py [--recordings 12] [--frames 1500] [--fi
 * Sizing: what a hundred and ten thousand recordings of ten minutes at 25 frames a second cost at the measured rate.
 """
 
-import argparse
 import hashlib
 import os
 import shutil
@@ -30,6 +29,7 @@ from fingervision.batch.task import CURVE_POINTS, Digest
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.rendering.clip import H264, write_clip
+from tests.benchmarks.options import options_of
 
 ROUNDS = 3
 LEAST_RATIO, MOST_S, MOST_MB = 1.7, 10.0, 300.0
@@ -160,11 +160,7 @@ def finished(folder: Path, count: int) -> None:
 
 def main() -> None:
     """Read the options and print."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--recordings", type=int, default=12)
-    options.add_argument("--frames", type=int, default=1500)
-    options.add_argument("--finished", type=int, default=10000)
-    chosen = options.parse_args()
+    chosen = options_of(__doc__, recordings=12, frames=1500, finished=10000)
     with TemporaryDirectory() as name:
         rate_hz = workers(Path(name), chosen.recordings, chosen.frames)
         finished(Path(name), chosen.finished)

@@ -1,6 +1,6 @@
 """Tests of the board's firmware: the real sketch on an emulated ATmega328P, with its client on a pseudo-terminal.
 
-    PYTHONPATH=. python tests/benchmarks/board.py [--seconds 60] [--slower 1]
+    python -m tests.benchmarks.board [--seconds 60] [--slower 1]
 
 The host's clock follows the emulated crystal (with a rate 0.5 % higher), so that results are valid on a loaded computer
 too, on which the emulator is slow; `--slower 4` slows the emulation further. The program prints three results with
@@ -9,7 +9,6 @@ edges of the drive line; and the time from the last message of the computer to t
 client is cut off during a motion.
 """
 
-import argparse
 import resource
 import sys
 from itertools import pairwise
@@ -22,6 +21,7 @@ import numpy as np
 from fingervision.domain.board_settings import Role
 from fingervision.testbed.board.board import Board, opened
 from fingervision.testbed.board.wire import Levels
+from tests.benchmarks.options import options_of
 from tests.testbed.emulated_board import WIRING, EmulatedBoard, MotorController, compiled, missing_tools, running
 
 EDGES, SILENCES = 12, 5
@@ -92,10 +92,7 @@ def silences(emulated: EmulatedBoard) -> None:
 
 def main() -> None:
     """Run all measurements, and print the results."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--slower", type=int, default=1)
-    options = parser.parse_args()
+    options = options_of(__doc__, seconds=60.0, slower=1)
     why = missing_tools()
     if why is not None:
         sys.exit(f"The emulated board {why}.")

@@ -9,10 +9,9 @@ distributions with the budget's standard uncertainties, and evenly between the s
 The edges are straight at the measuring height unless --radius-mm is 0.3 or more. There blooming moves the tip as well
 as the edge, and the edge bias of a straight reference is no longer that of the gap; the budget does not know the slope.
 
-    python tests/benchmarks/calibration_coverage.py [--trials 1000] [--jobs 2] [--seed 20261]
+    python -m tests.benchmarks.calibration_coverage [--trials 1000] [--jobs 2] [--seed 20261]
 """
 
-import argparse
 from concurrent.futures import ProcessPoolExecutor
 from math import sqrt
 
@@ -34,6 +33,7 @@ from fingervision.rendering.scene import Patch, Scene
 from fingervision.rendering.targets import bar, slot
 from fingervision.rendering.two_fingers import two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
+from tests.benchmarks.options import options_of
 
 FRAME = (640, 480)
 U_SIZE_MM = 0.001
@@ -130,13 +130,14 @@ def interval(held: int, count: int) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--trials", type=int, default=1000)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=20261)
-    parser.add_argument("--radius-mm", type=float, default=0.2, help="Of the tips; 0.5 shows what a curved edge adds.")
-    parser.add_argument("--drawn", choices=("normal", "even"), action="append", help="Only this; both by default.")
-    wish = parser.parse_args()
+    wish = options_of(
+        __doc__,
+        trials=1000,
+        jobs=2,
+        seed=20261,
+        radius_mm={"type": float, "default": 0.2, "help": "Of the tips; 0.5 shows what a curved edge adds."},
+        drawn={"choices": ("normal", "even"), "action": "append", "help": "Only this; both by default."},
+    )
     seeds = [wish.seed * 100_000 + number for number in range(wish.trials)]
     for shape in wish.drawn or ("normal", "even"):
         with ProcessPoolExecutor(wish.jobs) as pool:

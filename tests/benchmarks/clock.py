@@ -3,7 +3,6 @@
 `python -m tests.benchmarks.clock --series 500 --seed 1` prints the table of tests/benchmarks/README.md.
 """
 
-import argparse
 from collections import Counter
 from dataclasses import asdict, dataclass
 from time import monotonic, process_time
@@ -19,6 +18,7 @@ from fingervision.motion.clock.clock_offset import NoClockOffset
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks import drawn_recordings
+from tests.benchmarks.options import options_of
 
 FINE_HZ = 2000.0
 WIDEST_PX, FRAME_PX, BELOW_PX = 230.0, (360, 120), 10.2
@@ -161,14 +161,15 @@ def of_pictures(seed):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--series", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--laboratory", action="store_true", help="draw the recordings of drawn_recordings.py")
-    parser.add_argument("--rendered", action="store_true", help="render their frames, and measure the gap in these")
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--verbose", action="store_true")
-    asked = parser.parse_args()
+    asked = options_of(
+        __doc__,
+        series=50,
+        seed=1,
+        laboratory={"action": "store_true", "help": "draw the recordings of drawn_recordings.py"},
+        rendered={"action": "store_true", "help": "render their frames, and measure the gap in these"},
+        minutes=10.0,
+        verbose=False,
+    )
     rng = np.random.default_rng(asked.seed)
     tally = Counter()
     scores, seconds = [], []

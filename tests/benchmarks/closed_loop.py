@@ -1,6 +1,6 @@
 """Closed loop on rendered frames: effects added to the simulated test bed, and their diagnosis after `bed run`.
 
-Run as `python tests/benchmarks/closed_loop.py [--part named|open|all] [--out DIR] [--first N] [--seeds N]` from the
+Run as `python -m tests.benchmarks.closed_loop [--part named|open|all] [--out DIR] [--first N] [--seeds N]` from the
 project's folder; N successive seeds are used, starting with the first.
 
 The part `named` adds each effect alone (with its usual size), runs RICH, and prints the verdict, and names and
@@ -10,7 +10,6 @@ the final diagnosis is right, and the predicted and the actual gain: the increas
 by which other explanations are worse than the truth.
 """
 
-import argparse
 import json
 import time
 from pathlib import Path
@@ -27,6 +26,7 @@ from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testbed.run.run_folder import JOINED, SAMPLES, SIMULATION, rows_before, times_of
 from fingervision.testbed.simulation.injected_effects import Hidden
 from fingervision.testbed.simulation.parse_injected_effects import usual_values
+from tests.benchmarks.options import options_of
 
 NAMED = (
     "backlash", "friction_hysteresis", "stick_slip", "encoder_cyclic_error", "end_stop", "finger_contact",
@@ -159,12 +159,13 @@ def opened(out: Path, seeds: range) -> None:
 
 def main() -> None:
     """Print the tables of the selected parts."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--part", choices=("named", "open", "all"), default="all")
-    parser.add_argument("--out", type=Path, default=Path("build/closed_loop"))
-    parser.add_argument("--first", type=int, default=1, help="the first seed")
-    parser.add_argument("--seeds", type=int, default=1, help="how many")
-    chosen = parser.parse_args()
+    chosen = options_of(
+        __doc__,
+        part={"choices": ("named", "open", "all"), "default": "all"},
+        out=Path("build/closed_loop"),
+        first={"type": int, "default": 1, "help": "the first seed"},
+        seeds={"type": int, "default": 1, "help": "how many"},
+    )
     seeds = range(chosen.first, chosen.first + chosen.seeds)
     if chosen.part in ("named", "all"):
         named(chosen.out, seeds)

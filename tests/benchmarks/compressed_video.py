@@ -9,7 +9,6 @@ contrast and scale are random. Columns: RMS and largest error of `gap_px`; media
 within one and two of it (both parts together), which must be 68 and 95 %; pictures without a value.
 """
 
-import argparse
 import io
 import time
 import zlib
@@ -28,6 +27,7 @@ from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.video_file import VideoFile
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
+from tests.benchmarks.options import options_of
 
 Floats = NDArray[np.float64]
 WIDTH, HEIGHT, FRAMES = 640, 480, 16
@@ -223,11 +223,7 @@ def line(name: str, clips: int, seed: int) -> tuple[str, Floats]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--clips", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="*", choices=list(CLASSES))
-    options = parser.parse_args()
+    options = options_of(__doc__, clips=40, seed=1, only={"nargs": "*", "choices": list(CLASSES)})
     print("class                  frames   RMS px   max px median u   <1u %  <2u %  ms")
     within = []
     for name in options.only or CLASSES:

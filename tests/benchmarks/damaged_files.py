@@ -1,6 +1,6 @@
 """Files with faults: what is read as `ok` is what the undamaged file says at that time, or it is no number.
 
-Run as `python tests/benchmarks/damaged_files.py [--files 600] [--minutes 30] [--seed 1] [--only ffv1.mkv] [--verbose]`
+Run as `python -m tests.benchmarks.damaged_files [--files 600] [--minutes 30] [--seed 1] [--only ffv1.mkv] [--verbose]`
 from the top. A film of two moving fingers is coded in 26 kinds of file (codec and container). Every file then gets 1 to
 20 faults of one kind: flipped bits, bytes missing, bytes zeroed, bursts of random bytes, memory pages of 4 kB that hold
 an earlier page of the file (stale) or another page's content (swapped), MPEG-TS packets lost; or its end is cut off, or
@@ -32,6 +32,7 @@ from fingervision.frames.source import open_source
 from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
+from tests.benchmarks.options import options_of
 
 RATE_HZ, FRAMES, SIZE_PX = 25.0, 75, (320, 240)
 GREATEST_PX, BELOW_TIP_PX = 60.0, 6.0
@@ -236,16 +237,17 @@ def wrong(found: list[Row], times_s: np.ndarray, gaps_px: np.ndarray) -> list[tu
 
 def main() -> None:
     """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--files", type=int, default=600)
-    parser.add_argument("--first", type=int, default=0, help="number of the first file, to go on where a run ended")
-    parser.add_argument("--minutes", type=float, default=float("inf"))
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", choices=KINDS)
-    parser.add_argument("--films", type=int, default=0, help="measure this number of undamaged films instead")
-    parser.add_argument("--verbose", action="store_true")
-    parser.add_argument("--keep", action="store_true", help="keep the files with wrong rows in build/")
-    chosen = parser.parse_args()
+    chosen = options_of(
+        __doc__,
+        files=600,
+        first={"type": int, "default": 0, "help": "number of the first file, to go on where a run ended"},
+        minutes=float("inf"),
+        seed=1,
+        only={"choices": KINDS},
+        films={"type": int, "default": 0, "help": "measure this number of undamaged films instead"},
+        verbose=False,
+        keep={"action": "store_true", "help": "keep the files with wrong rows in build/"},
+    )
     kinds = [chosen.only] if chosen.only else list(KINDS)
     until = time.monotonic() + 60.0 * chosen.minutes
     with tempfile.TemporaryDirectory() as folder:

@@ -7,7 +7,6 @@ pictures' measurement has there; pictures themselves are left out, they cost ten
 `fingervision demo --hide A --hide B` does the same with pictures.
 """
 
-import argparse
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from itertools import pairwise
@@ -22,6 +21,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.effects import catalogue
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
+from tests.benchmarks.options import options_of
 
 EDGE_MM = 0.00014
 """Random noise of one edge in the demonstration's pictures (`u_random_mm` of the gap over the square root of 2)."""
@@ -97,12 +97,9 @@ def one(seed: int) -> tuple[str, bool, bool, str]:
 
 def main() -> None:
     """Draw, diagnose, count."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--draws", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=41)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--first", type=int, default=0, help="number of the first draw")
-    arguments = parser.parse_args()
+    arguments = options_of(
+        __doc__, draws=300, seed=41, jobs=2, first={"type": int, "default": 0, "help": "number of the first draw"}
+    )
     seeds = [1000 * arguments.seed + k for k in range(arguments.first, arguments.first + arguments.draws)]
     results = []
     with ProcessPoolExecutor(arguments.jobs) as pool:

@@ -7,7 +7,6 @@ has play, no effect, or play and an offset. Wall time depends on other programs 
 processor time is that of the diagnosis alone, summed over all cores.
 """
 
-import argparse
 import os
 import tempfile
 import time
@@ -18,6 +17,7 @@ import numpy as np
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
+from tests.benchmarks.options import options_of
 
 BARS_S = {100: 2.0, 2000: 5.0, 20000: 60.0}
 RATE_HZ = 20.0
@@ -68,10 +68,7 @@ def write(folder: Path, samples: int, hidden: str, seed: int) -> None:
 
 def main() -> None:
     """Read the options, measure the durations, and print the table."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--samples", default="100,2000,20000")
-    options.add_argument("--hidden", default=",".join(HIDDEN))
-    chosen = options.parse_args()
+    chosen = options_of(__doc__, samples="100,2000,20000", hidden={"default": ",".join(HIDDEN)})
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; the first line compiles where nothing is cached")
     print("samples  hidden    wall s  processor s  bar s  verdict")
     for samples in map(int, chosen.samples.split(",")):

@@ -1,6 +1,6 @@
 """The first run after an installation, and the start of every other one.
 
-    python tests/benchmarks/first_run.py [--runs 3]
+    python -m tests.benchmarks.first_run [--runs 3]
 
 A copy of the project without any byte code of its own is started in a new folder, with a new cache: first without the
 library of its loops (a source tree that is run for the first time: it is compiled), then with it (an installation from
@@ -8,7 +8,6 @@ a wheel, which brings it). Columns: seconds from the command to the end, and sec
 included; on a machine that is busy the second is the one to read. `live` is timed to its first measured frame.
 """
 
-import argparse
 import os
 import resource
 import shutil
@@ -19,6 +18,8 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+
+from tests.benchmarks.options import options_of
 
 TOP = Path(__file__).resolve().parents[2]
 SAMPLE = TOP / "sample_frames" / "opening" / "opening.mp4"
@@ -67,9 +68,7 @@ def row(words: str, figures: list[tuple[float, float]], budget_s: float) -> None
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=3)
-    runs = parser.parse_args().runs
+    runs = options_of(__doc__, runs=3).runs
     measure = ["-m", "fingervision", "measure", str(SAMPLE), "--px-per-mm", "34", "--out"]
     live = ["-m", "fingervision", "live", "simulated", "--json", "--port", "0", "--out"]
     with tempfile.TemporaryDirectory() as name:

@@ -9,7 +9,6 @@ for each class: tables read rightly without a question, wrongly without a questi
 wrongly after obeying (must be 0), and dead ends (at most one in ten). Exit code 1 if a bar is not met.
 """
 
-import argparse
 import re
 import shlex
 import tempfile
@@ -24,6 +23,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.tables.questions import OpenQuestionError, Reading
 from fingervision.tables.read import read_drive, read_measured_table
 from tests.benchmarks.foreign.drawn import CLASSES, Drawn, Values, drawn
+from tests.benchmarks.options import options_of
 
 ROUNDS = 6
 OUTCOMES = ("right", "wrong", "right after advice", "wrong after advice", "dead end")
@@ -125,12 +125,13 @@ def _fits(reading: Reading, table: Drawn) -> bool:
 
 def main() -> None:
     """Draw, obey, compare, print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--each", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", choices=list(CLASSES))
-    parser.add_argument("--show", action="store_true", help="print what was said for each table not simply right")
-    given = parser.parse_args()
+    given = options_of(
+        __doc__,
+        each=40,
+        seed=1,
+        only={"choices": list(CLASSES)},
+        show={"action": "store_true", "help": "print what was said for each table not simply right"},
+    )
     counts: dict[str, Counter[str]] = {label: Counter() for label in CLASSES}
     with tempfile.TemporaryDirectory() as top:
         for number, (label, table) in enumerate(drawn(given.seed, given.each)):

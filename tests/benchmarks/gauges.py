@@ -16,7 +16,6 @@ cost         milliseconds of one core a frame (640x480): 1, 2 and 3 edges, 20 pa
 silence      frames without the thing a gauge looks for, and the numbers that were given all the same
 """
 
-import argparse
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -32,6 +31,7 @@ from fingervision.gauges.picture import picture_of
 from fingervision.gauges.reading import Reading
 from fingervision.vision.pipeline import Settings
 from tests.benchmarks.drawn_surfaces import SURFACES
+from tests.benchmarks.options import options_of
 from tests.gauges.drawn import Texture, bar, checker, cross, disc, drawn, half_plane, seen
 from tests.gauges.followed import followed, gauges_of, share_within
 
@@ -277,11 +277,9 @@ PARTS = {f.__name__: f for f in (patches, photographs, drawings, lines, circles,
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--each", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="+", choices=sorted(PARTS), default=list(PARTS))
-    arguments = parser.parse_args()
+    arguments = options_of(
+        __doc__, each=40, seed=1, only={"nargs": "+", "choices": sorted(PARTS), "default": list(PARTS)}
+    )
     with tempfile.TemporaryDirectory() as folder:
         for name in arguments.only:
             PARTS[name](arguments.each, Path(folder), arguments.seed)

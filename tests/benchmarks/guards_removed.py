@@ -7,7 +7,6 @@ they are, and must pass. With --browser also the guards whose tests need Chromiu
 go unnoticed.
 """
 
-import argparse
 import os
 import shutil
 import subprocess
@@ -15,6 +14,8 @@ import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+
+from tests.benchmarks.options import options_of
 
 TOP = Path(__file__).parents[2]
 LIVE = "fingervision/live"
@@ -261,10 +262,7 @@ def pytest_passes(top: Path, tests: list[str]) -> bool:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", default="", help="part of a guard's name")
-    parser.add_argument("--browser", action="store_true")
-    chosen = parser.parse_args()
+    chosen = options_of(__doc__, only={"default": "", "help": "part of a guard's name"}, browser=False)
     guards = [each for each in GUARDS + IN_A_BROWSER * chosen.browser if chosen.only in each.name]
     unseen = 0
     with tempfile.TemporaryDirectory() as name:

@@ -10,7 +10,6 @@ the camera is set up anew within 2 degrees and 0.5 %, and its calibration is kno
 input's gauge up anew as well; `--other-specimen` draws every thickness within 1 % for the second recording.
 """
 
-import argparse
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -35,6 +34,7 @@ from fingervision.models.planar_region import PlanarRegion
 from fingervision.rendering import Camera, Patch, Scene, render
 from fingervision.rendering.polygon import polygon
 from fingervision.storage.mechanism_toml import read_mechanism
+from tests.benchmarks.options import options_of
 
 Array = NDArray[np.float64]
 DRAWINGS = Path(__file__).parent / "mechanisms"
@@ -291,14 +291,16 @@ def words_of(found: WhatChanged) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Read the options, record, compare, and print the bars."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--frames", type=int, default=36)
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--nulls", type=int, default=3, help="recordings of each mechanism with nothing hidden")
-    options.add_argument("--only", default=",".join(CASES))
-    options.add_argument("--gain", type=float, default=0.0, help="error of the input's gain on the second day")
-    options.add_argument("--other-specimen", action="store_true", help="another specimen on the second day")
-    chosen = options.parse_args(arguments)
+    chosen = options_of(
+        __doc__,
+        arguments,
+        frames=36,
+        seed=1,
+        nulls={"type": int, "default": 3, "help": "recordings of each mechanism with nothing hidden"},
+        only={"default": ",".join(CASES)},
+        gain={"type": float, "default": 0.0, "help": "error of the input's gain on the second day"},
+        other_specimen={"action": "store_true", "help": "another specimen on the second day"},
+    )
     tally = dict.fromkeys(("still frames and motion", "motion alone", "still frames alone"), 0)
     faults = nulls = claims = false = 0
     for number, name in enumerate(chosen.only.split(",")):

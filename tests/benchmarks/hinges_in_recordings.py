@@ -17,7 +17,6 @@ scaled    the stated scale is off by 0.2 to 20 %
 The drive of the sample bends: its edges move by up to 4 um otherwise than its area.
 """
 
-import argparse
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -35,6 +34,7 @@ from fingervision.measuring.drawing_placement import GivenPoint
 from fingervision.models.mechanism_bodies import bodies_of, plate_poses
 from fingervision.models.place_answers import PlaceAnswers
 from tests.benchmarks.drawn_hinges import Hidden, frames_of, hidden, view_of
+from tests.benchmarks.options import options_of
 from tests.benchmarks.which_hinge import BODIES, Array, drawn
 
 PARTS = ("x_mm", "y_mm", "angle_mrad")
@@ -93,16 +93,18 @@ def verdict_of(what: Hidden, found: PlaceFindings, scale_off: float) -> tuple[st
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Render, follow, diagnose, print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--recordings", type=int, default=20)
-    parser.add_argument("--frames", type=int, default=40)
-    parser.add_argument("--px-per-mm", type=float, default=6.0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--bodies", nargs="+", choices=BODIES, default=list(BODIES))
-    parser.add_argument("--hidden", choices=("one", "two"), default="one")
-    parser.add_argument("--view", nargs="+", choices=VIEWS, default=["plain"])
-    parser.add_argument("--points", type=int, choices=(2, 3), default=3)
-    given = parser.parse_args(arguments)
+    given = options_of(
+        __doc__,
+        arguments,
+        recordings=20,
+        frames=40,
+        px_per_mm=6.0,
+        seed=1,
+        bodies={"nargs": "+", "choices": BODIES, "default": list(BODIES)},
+        hidden={"choices": ("one", "two"), "default": "one"},
+        view={"nargs": "+", "choices": VIEWS, "default": ["plain"]},
+        points={"type": int, "choices": (2, 3), "default": 3},
+    )
     answers = PlaceAnswers(drawn())
     names = tuple(f"{body}.{part}" for body in given.bodies for part in PARTS)
     counts: dict[str, Counter[str]] = {}

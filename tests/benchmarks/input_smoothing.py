@@ -1,11 +1,10 @@
 """Error of the recorded input after smoothing, true and as stated, both as shares of the variance before smoothing.
 
-    PYTHONPATH=. python tests/benchmarks/input_smoothing.py --records 200 --seed 2
+    python -m tests.benchmarks.input_smoothing --records 200 --seed 2
 
 Motions, noise and encoders are those of the benchmark `hidden`.
 """
 
-import argparse
 from collections import defaultdict
 from itertools import pairwise
 
@@ -16,6 +15,7 @@ from fingervision.motion.local_polynomial_smoothing import blended, smoothed
 from tests.benchmarks.hidden.design import Kind, draw_design
 from tests.benchmarks.hidden.gripper_table import draw_table
 from tests.benchmarks.hidden.noise import draw_noise, rounded
+from tests.benchmarks.options import options_of
 
 KINDS: tuple[Kind, ...] = ("rich", "ordinary", "poor")
 SINE = 2
@@ -24,10 +24,7 @@ SINE = 2
 
 def main() -> None:
     """Simulate records, smooth the records, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--records", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=2)
-    asked = parser.parse_args()
+    asked = options_of(__doc__, records=200, seed=2)
     rng = np.random.default_rng(asked.seed)
     left: dict[tuple[str, str, str], list[tuple[float, float]]] = defaultdict(list)
     drawn = 0

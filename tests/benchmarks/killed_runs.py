@@ -1,13 +1,12 @@
 """`kill -9` at random moments of a run on the bed: what is lost, whether the folder is valid, how it is gone on with.
 
-Run as `python tests/benchmarks/killed_runs.py [--moments 50] [--seed 1] [--out DIR]` from the top. A run in real time
+Run as `python -m tests.benchmarks.killed_runs [--moments 50] [--seed 1] [--out DIR]` from the top. A run in real time
 is killed at a random moment between its first and its last frame; then the same command is given again, as fast as it
 goes. Printed: how many folders were valid (table and video can be read and belong together, run.json says that it is
 not complete), the most seconds lost (frames that had come and have no row), and how many resumed runs ended with the
 very table of a run that was never killed.
 """
 
-import argparse
 import json
 import os
 import shutil
@@ -22,6 +21,7 @@ import numpy as np
 from fingervision.storage.recipe_toml import write_recipe
 from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.samples_csv import read_samples
+from tests.benchmarks.options import options_of
 
 STEPS: tuple[dict[str, object], ...] = (
     {"kind": "triangle", "from_mm": -0.2, "to_mm": 0.4, "speed_mm_s": 0.4},
@@ -41,11 +41,7 @@ def command(recipe: Path, out: Path, *more: str) -> list[str]:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--moments", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path("build/killed_runs"))
-    chosen = parser.parse_args()
+    chosen = options_of(__doc__, moments=50, seed=1, out=Path("build/killed_runs"))
     shutil.rmtree(chosen.out, ignore_errors=True)
     chosen.out.mkdir(parents=True)
     recipe = chosen.out / "recipe.toml"

@@ -43,6 +43,7 @@ from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.gaps_csv import GapRow
+from tests.benchmarks.options import options_of
 
 ASLEEP_AFTER_S, BEGINS_WITHIN_S = 5.0, 30.0
 CYCLE, PX_PER_MM = 50, 34.0
@@ -67,18 +68,19 @@ with connect(f"ws://{at.netloc}/socket?{at.query}", origin=f"http://{at.netloc}"
 
 def main() -> None:
     """Run once and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=600.0)
-    parser.add_argument("--size", default="640x480")
-    parser.add_argument("--rate-hz", type=int, default=25)
-    parser.add_argument("--record", action="store_true")
-    parser.add_argument("--page", action="store_true")
-    parser.add_argument("--viewers", type=int, default=0)
-    parser.add_argument("--rtsp", action="store_true")
-    parser.add_argument("--busy", type=int, default=0)
-    parser.add_argument("--colour", action="store_true")
-    parser.add_argument("--json", action="store_true")
-    wanted = parser.parse_args()
+    wanted = options_of(
+        __doc__,
+        seconds=600.0,
+        size="640x480",
+        rate_hz=25,
+        record=False,
+        page=False,
+        viewers=0,
+        rtsp=False,
+        busy=0,
+        colour=False,
+        json=False,
+    )
     width_px, height_px = (int(part) for part in wanted.size.split("x"))
     with tempfile.TemporaryDirectory() as folder:
         pictures = Path(folder) / "camera.mjpeg"

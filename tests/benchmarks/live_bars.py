@@ -14,12 +14,13 @@ of a part is its own process's: capture, decoding, measuring, serving the page. 
 it did not come to send is told beside what was lost.
 """
 
-import argparse
 import json
 import os
 import subprocess
 import sys
 from typing import Any
+
+from tests.benchmarks.options import options_of
 
 MOST_ALONE, MOST_ADDED, MOST_GROWN_MB = 0.15, 0.03, 10.0
 
@@ -41,9 +42,7 @@ def told(what: str, figure: str, bar: str, *, met: bool) -> None:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--minutes", type=float, default=10.0)
-    long_s = 60.0 * parser.parse_args().minutes
+    long_s = 60.0 * options_of(__doc__, minutes=10.0).minutes
     long, short = f"--seconds={long_s}", f"--seconds={max(20.0, long_s / 5.0)}"
     print(f"load of the machine before: {os.getloadavg()[0]:.1f}")
     alone = part(short)

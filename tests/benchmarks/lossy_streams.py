@@ -6,7 +6,6 @@ agree to the last digit, rows, damaged ones, and rows of the live table that are
 standard uncertainties and 0.1 px against the stream without losses).
 """
 
-import argparse
 import csv
 import tempfile
 from pathlib import Path
@@ -19,6 +18,7 @@ from fingervision.frames.source import open_source
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
+from tests.benchmarks.options import options_of
 from tests.live.test_damaged_stream import COUNT, SCALE, SIZE_PX, coded, recorded
 
 TASK = Task(BareScale(SCALE))
@@ -38,10 +38,7 @@ def wrong_rows(live: list[dict[str, str]], times_s: NDArray[np.float64], gaps_px
 
 def main() -> None:
     """Print the counts."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=1)
-    chosen = parser.parse_args()
+    chosen = options_of(__doc__, runs=50, seed=1)
     rng = np.random.default_rng(chosen.seed)
     camera = Camera(noise_grey=1.0)
     film = [

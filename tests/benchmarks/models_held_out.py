@@ -1,6 +1,5 @@
 """Print the errors of all kinds of model for grippers to which nothing was fitted: slope, force, stress and modes."""
 
-import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from fingervision.models.lumped import LumpedGripper
 from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.gripper_toml import read_gripper
+from tests.benchmarks.options import options_of
 
 ROOT = Path(__file__).parents[2]
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
@@ -73,10 +73,11 @@ def main() -> None:
     """Print errors in % against the plane model with a mesh twice as fine; its force and modes include the width
     effect.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seed", type=int, help="draw others at random; the fixed ones without")
-    parser.add_argument("--count", type=int, default=6, help="how many with --seed")
-    asked = parser.parse_args()
+    asked = options_of(
+        __doc__,
+        seed={"type": int, "help": "draw others at random; the fixed ones without"},
+        count={"type": int, "default": 6, "help": "how many with --seed"},
+    )
     rows = HELD_OUT if asked.seed is None else tuple(drawn_at_random(asked.count, asked.seed))
     sample = read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")
     print(

@@ -1,6 +1,5 @@
 """Compare slope, force and modes of drawings to which nothing was fitted with wedge elements of CalculiX."""
 
-import argparse
 import shutil
 import sys
 import time
@@ -20,6 +19,7 @@ from fingervision.models.triangulate import triangulate
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.models_held_out import ABS, ALUMINIUM, SILICON, STEEL, TITANIUM, drawn
+from tests.benchmarks.options import options_of
 from tests.benchmarks.solid_reference import solid_answer
 
 ROOT = Path(__file__).parents[2]
@@ -95,10 +95,11 @@ def cases() -> list[tuple[str, Mechanism, Gripper | None]]:
 
 def main() -> None:
     """Print one line per drawing: errors (%) of the plane models compared with the three-dimensional model."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", type=int, nargs="*", help="places of drawings in the list; all without")
-    parser.add_argument("--layers", type=int, default=4, help="wedges through the plate")
-    asked = parser.parse_args()
+    asked = options_of(
+        __doc__,
+        only={"type": int, "nargs": "*", "help": "places of drawings in the list; all without"},
+        layers={"type": int, "default": 4, "help": "wedges through the plate"},
+    )
     if shutil.which("ccx") is None:
         sys.exit("CalculiX (ccx, Debian package calculix-ccx) must be installed, but is not.")
     print("drawing | largest motion of a probe: finite_element, lumped | force: same | mode in the plane, drive held: "

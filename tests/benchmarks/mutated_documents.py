@@ -1,12 +1,11 @@
 """TOML and JSON files with a character changed here and there: read, or refused in a sentence; nothing else.
 
-Run as `python tests/benchmarks/mutated_documents.py [--files 2000] [--seed 1]` from the top. Whole documents of every
+Run as `python -m tests.benchmarks.mutated_documents [--files 2000] [--seed 1]` from the top. Whole documents of every
 kind that is read (gripper, corrected model, recipe, board settings, calibration) get 1 to 5 changes: characters lost,
 doubled or replaced, numbers replaced by nan, inf, text, lists, a number of 400 digits. Printed for each kind: files,
 files that were read, refused ones, faults (anything else than a sentence), and results with a number that is none.
 """
 
-import argparse
 import math
 import re
 import tempfile
@@ -26,6 +25,7 @@ from fingervision.storage.model_toml import read_model
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.steps_toml import read_steps
 from fingervision.storage.toml_section import Section
+from tests.benchmarks.options import options_of
 
 MODEL = """schema = 1
 base = "simulation.csv"
@@ -133,10 +133,7 @@ def is_sound(value: object, depth: int = 0) -> bool:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--files", type=int, default=2000)
-    parser.add_argument("--seed", type=int, default=1)
-    chosen = parser.parse_args()
+    chosen = options_of(__doc__, files=2000, seed=1)
     rng = np.random.default_rng(chosen.seed)
     top = Path(__file__).parents[2]
     with tempfile.TemporaryDirectory() as name:

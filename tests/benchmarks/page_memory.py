@@ -6,7 +6,6 @@ pictures shown so far. The chart keeps ten minutes of rows, and messages are few
 them must stay as they are.
 """
 
-import argparse
 import os
 import re
 import subprocess
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
+from tests.benchmarks.options import options_of
 from tests.live.browser import CHROMIUM, QUIET
 
 START_S, EVERY_S = 120.0, 60.0
@@ -32,9 +32,7 @@ def resident_mb(process: int) -> float:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--minutes", type=float, default=15.0)
-    chosen = parser.parse_args()
+    chosen = options_of(__doc__, minutes=15.0)
     with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
         log = Path(name) / "log"
         command = [sys.executable, "-m", "fingervision", "live", "simulated", "--port", "0", "--out", f"{name}/out"]

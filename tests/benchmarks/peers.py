@@ -1,13 +1,12 @@
 """Error of the gap between straight edges against the Cramer-Rao bound, beside other methods on the same frames.
 
-    python tests/benchmarks/peers.py [--frames 60] [--seed 3]
+    python -m tests.benchmarks.peers [--frames 60] [--seed 3]
 
 RMS about the truth in px. find_contours and the derivative are given so many rows below the measuring height and the
 mean of their answers is taken; on round tips they are given the two rows beside it and interpolate. The paper counts
 pixels in the one row. `fingervision` takes the rows it finds, so beside few rows it may lie below their bound.
 """
 
-import argparse
 from math import pi, sqrt
 
 import cv2
@@ -19,6 +18,7 @@ from fingervision.domain.frame import Frame, Pixels
 from fingervision.domain.gap import GapMeasurement
 from fingervision.rendering import Camera, TrueGap, render, truth, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
+from tests.benchmarks.options import options_of
 
 BELOW_PX = 10.2
 CONTRAST, WINDOW_PX = 160.0, 20.0
@@ -99,10 +99,7 @@ def rms(blur: float, noise: float, rows: int, radius: float, frames: int, seed: 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--frames", type=int, default=60)
-    parser.add_argument("--seed", type=int, default=3)
-    options = parser.parse_args()
+    options = options_of(__doc__, frames=60, seed=3)
     print("blur noise rows radius    bound  fingervision  Otsu+count  find_contours  derivative+parabola")
     for blur, noise, rows, radius in (
         (0.9, 2.0, 20, 0.0), (0.9, 2.0, 1, 0.0), (0.9, 2.0, 60, 0.0), (0.5, 2.0, 20, 0.0), (2.0, 2.0, 20, 0.0),

@@ -1,4 +1,4 @@
-"""Milliseconds to draw a frame and to find its truth: `python tests/benchmarks/rendering.py`."""
+"""Milliseconds to draw a frame and to find its truth: `python -m tests.benchmarks.rendering`."""
 
 from collections.abc import Callable
 from time import perf_counter

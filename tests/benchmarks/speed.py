@@ -1,6 +1,6 @@
 """Speed, memory and start-up of `measure`.
 
-    python tests/benchmarks/speed.py [--frames 1500] [--runs 5] [--only rate|kinds|memory|start] [--sizes 1920x1080]
+    python -m tests.benchmarks.speed [--frames 1500] [--runs 5] [--only rate|kinds|memory|start] [--sizes 1920x1080]
         [--coders ffv1.mkv] [--lengths 60 2000]
 
 Rate: frames per second of decoding alone and of measuring, in turn on the same file, medians; and milliseconds of one
@@ -11,7 +11,6 @@ picture (`--sizes`). Start-up: `fingervision --help`. Every figure is that of th
 rates is 640x480, H.264 of about 5 Mbit/s.
 """
 
-import argparse
 import statistics
 import subprocess
 import sys
@@ -40,6 +39,7 @@ from fingervision.vision.pipeline import Settings, measure_frame
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.benchmarks.damaged_files import KINDS, coded
+from tests.benchmarks.options import options_of
 from tests.benchmarks.scenes.empty import EMPTY
 
 PX_PER_MM = 34.0
@@ -232,14 +232,15 @@ def start_up(runs: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", type=int, default=1500)
-    parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--only", choices=["rate", "kinds", "memory", "start"])
-    parser.add_argument("--sizes", nargs="+", default=SIZES)
-    parser.add_argument("--coders", nargs="+", default=CODERS, choices=CODERS)
-    parser.add_argument("--lengths", nargs=2, type=int, default=LENGTHS)
-    asked = parser.parse_args()
+    asked = options_of(
+        __doc__,
+        frames=1500,
+        runs=5,
+        only={"choices": ["rate", "kinds", "memory", "start"]},
+        sizes={"nargs": "+", "default": SIZES},
+        coders={"nargs": "+", "default": CODERS, "choices": CODERS},
+        lengths={"nargs": 2, "type": int, "default": LENGTHS},
+    )
     with tempfile.TemporaryDirectory() as name:
         folder, levels = Path(name), pictures() if asked.only in (None, "rate") else []
         if asked.only in (None, "rate"):

@@ -1,11 +1,10 @@
 """Candidates for the steps that only find: time per 640x480 frame and error, on the same frames.
 
-    python tests/benchmarks/steps.py [--frames 10] [--seed 4]
+    python -m tests.benchmarks.steps [--frames 10] [--seed 4]
 
 Error: share of pixels that the step then calls dark or light wrongly, against the picture without noise.
 """
 
-import argparse
 import time
 from collections.abc import Callable
 
@@ -19,6 +18,7 @@ from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.binarise import binarise
 from fingervision.vision.grey import denoise
 from fingervision.vision.outlines import find_outlines
+from tests.benchmarks.options import options_of
 
 DENOISE: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "none": lambda a: a,
@@ -41,10 +41,7 @@ OUTLINE: dict[str, Callable[[np.ndarray], object]] = {
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--frames", type=int, default=10)
-    parser.add_argument("--seed", type=int, default=4)
-    options = parser.parse_args()
+    options = options_of(__doc__, frames=10, seed=4)
     rng = np.random.default_rng(options.seed)
     pairs = []
     for _ in range(options.frames):

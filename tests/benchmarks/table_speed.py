@@ -4,7 +4,6 @@ Printed are seconds of processor time of this process, median of three, and the 
 are read in a process of their own, whose time is added. Excel is measured with a tenth of the rows.
 """
 
-import argparse
 import datetime as dt
 import resource
 import statistics
@@ -15,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.tables.read import read_measured_table
+from tests.benchmarks.options import options_of
 
 REPEATS = 3
 
@@ -83,9 +83,7 @@ def tables(rows: int, folder: Path) -> Iterator[tuple[str, Path]]:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rows", type=int, default=1_000_000)
-    rows = parser.parse_args().rows
+    rows = options_of(__doc__, rows=1_000_000).rows
     with tempfile.TemporaryDirectory() as folder:
         for name, path in tables(rows, Path(folder)):
             spent = []

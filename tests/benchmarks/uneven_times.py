@@ -8,7 +8,6 @@ another clock, and diagnosed with the model from which the frames were drawn. Pr
 frames called damaged (must be 0), clocks that are not determined, and verdicts; `agrees` or `unknown` must be 95 %.
 """
 
-import argparse
 import tempfile
 import time
 from collections import Counter, defaultdict
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 import fingervision as fv
 from fingervision.domain.errors import FingervisionError
 from fingervision.rendering import Camera, render, two_fingers
+from tests.benchmarks.options import options_of
 
 Values = NDArray[np.float64]
 PX_PER_MM, FRAME_PX, BELOW_TIP_MM, DURATION_S = 30.0, (320, 96), 0.3, 9.0
@@ -119,16 +119,15 @@ def examined(folder: Path, kind: str, rng: Generator) -> tuple[int, int, str, st
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--recordings", type=int, default=100)
-    parser.add_argument(
-        "--first", type=int, default=0, help="number of the first recording, to go on where a run ended"
+    chosen = options_of(
+        __doc__,
+        recordings=100,
+        first={"type": int, "default": 0, "help": "number of the first recording, to go on where a run ended"},
+        only={"choices": KINDS},
+        minutes=float("inf"),
+        seed=1,
+        verbose=False,
     )
-    parser.add_argument("--only", choices=KINDS)
-    parser.add_argument("--minutes", type=float, default=float("inf"))
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--verbose", action="store_true")
-    chosen = parser.parse_args()
     until = time.monotonic() + 60.0 * chosen.minutes
     totals: dict[str, Counter[str]] = defaultdict(Counter)
     with tempfile.TemporaryDirectory() as folder:

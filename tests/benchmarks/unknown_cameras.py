@@ -10,7 +10,6 @@ mean errors; median expanded uncertainty (k = 2) from both parts; its ratio to t
 measured with.
 """
 
-import argparse
 import io
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -32,6 +31,7 @@ from fingervision.measuring.task import Task
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX, SIZE_PX, gripper
 from tests.benchmarks.camera_artefacts.optics import Surface, light_on_sensor
 from tests.benchmarks.camera_artefacts.scene import true_gap
+from tests.benchmarks.options import options_of
 
 Floats = NDArray[np.float64]
 Pictures = list[NDArray[np.uint8]]
@@ -256,13 +256,14 @@ def row(name: str, recordings: Sequence[Recording], camera: Callable[[Recording]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--recordings", type=int, default=8)
-    parser.add_argument("--frames", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="*", choices=list(CLASSES))
-    parser.add_argument("--surface", choices=list(SURFACES), default="", help="what lies beside the edges")
-    options = parser.parse_args()
+    options = options_of(
+        __doc__,
+        recordings=8,
+        frames=20,
+        seed=1,
+        only={"nargs": "*", "choices": list(CLASSES)},
+        surface={"choices": list(SURFACES), "default": "", "help": "what lies beside the edges"},
+    )
     recordings = [
         drawn(1000 * options.seed + k, options.frames, SURFACES[options.surface]) for k in range(options.recordings)
     ]

@@ -1,6 +1,6 @@
 """Four pages look at one live view: whether any of them ever stands still.
 
-Run as `python tests/benchmarks/viewers.py [--rate-hz 200] [--seconds 3600] [--viewers 4]` from the top. A simulated
+Run as `python -m tests.benchmarks.viewers [--rate-hz 200] [--seconds 3600] [--viewers 4]` from the top. A simulated
 camera runs in a process of its own; each viewer acknowledges what it gets, as the page does. The first viewer works the
 page, the others have the address that only looks. Printed for each: messages, new pictures, rows of the history, places
 where rows are missing, the longest wait for a message, for a new picture and for a new row, the age of the last picture
@@ -10,7 +10,6 @@ memory after each tenth of the time, and its share of a core. A viewer has froze
 life: a page whose measurement stands still gets five of them a second.
 """
 
-import argparse
 import json
 import os
 import re
@@ -25,6 +24,8 @@ from threading import Thread
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
+
+from tests.benchmarks.options import options_of
 
 # The page says "no picture" half a second after the last one (`SILENT_S` of the session): what waits four times as
 # long stands still.
@@ -128,11 +129,7 @@ class Cost:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rate-hz", type=float, default=200.0)
-    parser.add_argument("--seconds", type=float, default=3600.0)
-    parser.add_argument("--viewers", type=int, default=4)
-    chosen = parser.parse_args()
+    chosen = options_of(__doc__, rate_hz=200.0, seconds=3600.0, viewers=4)
     with tempfile.TemporaryDirectory() as out:
         command = ["live", "simulated", "--rate-hz", str(chosen.rate_hz), "--port", "0", "--out", str(Path(out) / "o")]
         called = [sys.executable, "-m", "fingervision", *command]

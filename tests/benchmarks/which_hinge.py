@@ -8,7 +8,6 @@ condensed bodies of the diagnosis are not used for the data. Tables have two run
 correlation, an input error of 0.2 um, and a drawing that is rotated by a milliradian in the picture.
 """
 
-import argparse
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -31,6 +30,7 @@ from fingervision.models.plane_shapes import Polygon
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import triangulate
 from fingervision.storage.gripper_toml import read_gripper
+from tests.benchmarks.options import options_of
 
 Array = NDArray[np.float64]
 
@@ -336,12 +336,14 @@ def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the results of all tables, and their statistics."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tables", type=int, default=60)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--two", type=int, default=0, help="tables with two things hidden")
-    parser.add_argument("--verbose", action="store_true")
-    given = parser.parse_args(arguments)
+    given = options_of(
+        __doc__,
+        arguments,
+        tables=60,
+        seed=1,
+        two={"type": int, "default": 0, "help": "tables with two things hidden"},
+        verbose=False,
+    )
     began = time.perf_counter()
     answers = PlaceAnswers(drawn())
     things = hidden_things(given.seed)

@@ -8,7 +8,6 @@ beyond 0.25 px and beyond 2 u (wrong and not said); refused frames with their st
 given the camera's transfer curve, as `--response` does.
 """
 
-import argparse
 import zlib
 from dataclasses import replace
 
@@ -21,6 +20,7 @@ from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX, CLASSES, Shot
+from tests.benchmarks.options import options_of
 
 LEVELS = np.linspace(0.0, 1.0, 256)
 RESPONSES = {
@@ -60,12 +60,13 @@ def line(name: str, frames: int, seed: int, told: bool) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--frames", type=int, default=400)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="*", choices=list(CLASSES))
-    parser.add_argument("--told", action="store_true", help="the measuring knows the camera's transfer curve")
-    options = parser.parse_args()
+    options = options_of(
+        __doc__,
+        frames=400,
+        seed=1,
+        only={"nargs": "*", "choices": list(CLASSES)},
+        told={"action": "store_true", "help": "the measuring knows the camera's transfer curve"},
+    )
     print("class              frames   RMS px   mean px   max px median u  u shift  <2u %  both % unsaid%  refused")
     for name in options.only or CLASSES:
         print(line(name, options.frames, options.seed, options.told), flush=True)

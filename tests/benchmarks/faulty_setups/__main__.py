@@ -8,7 +8,6 @@ less the same of the bench without the fault; for vibration the standard deviati
 Nobody states the camera's response: it is found out, or said to be unknown.
 """
 
-import argparse
 import tempfile
 from collections import Counter
 from pathlib import Path
@@ -23,6 +22,7 @@ from fingervision.inspection.sample import take_sample
 from fingervision.measuring.task import Task
 from tests.benchmarks.faulty_setups.bench import BELOW_MM, PX_PER_MM, Bench, recorded
 from tests.benchmarks.faulty_setups.faults import FAULTS, good
+from tests.benchmarks.options import options_of
 
 
 def inspected(bench: Bench, frames: int, rng: np.random.Generator):
@@ -48,14 +48,9 @@ def inspected(bench: Bench, frames: int, rng: np.random.Generator):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--setups", type=int, default=500)
-    parser.add_argument("--good", type=int, default=100)
-    parser.add_argument("--frames", type=int, default=8)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="*", choices=list(FAULTS))
-    parser.add_argument("--verbose", action="store_true")
-    options = parser.parse_args()
+    options = options_of(
+        __doc__, setups=500, good=100, frames=8, seed=1, only={"nargs": "*", "choices": list(FAULTS)}, verbose=False
+    )
     rng = np.random.default_rng(options.seed)
     named, drawn = 0, 0
     print("fault         set-ups  first   stated um   error um   named instead")

@@ -8,7 +8,6 @@ answer remains ambiguous, the benchmark tests whether any of its own motions wou
 other explanations. Seeds below 1000 are for development, seeds from 2000 on for results.
 """
 
-import argparse
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +26,7 @@ from tests.benchmarks.hidden.next_run_gain import Gain, gain_that_came, with_sec
 from tests.benchmarks.hidden.recipe import NotDrivenError, drive, drive_recipe
 from tests.benchmarks.hidden.rows import ROWS
 from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
+from tests.benchmarks.options import options_of
 
 Array = NDArray[np.float64]
 APART = 16.0
@@ -139,12 +139,7 @@ def line_of(index: int, case: Followed) -> str:
 
 def main() -> None:
     """Read the options, process the tables, and print the results."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--tables", type=int, default=40)
-    options.add_argument("--first", type=int, default=0)
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--out", type=Path, default=Path("results/promises"))
-    chosen = options.parse_args()
+    chosen = options_of(__doc__, tables=40, first=0, seed=1, out=Path("results/promises"))
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     cases, able = [], 0
     for index in range(chosen.first, chosen.first + chosen.tables):
