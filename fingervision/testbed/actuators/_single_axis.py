@@ -29,6 +29,11 @@ PATIENCE, PATIENCE_S, HOME_S = 1.5, 2.0, 120.0
 LOST_MM = 0.02
 HOMING_MM_S = 1.0
 LOOK_EVERY_S = 0.01
+# A stage stands still if for STILL_S it was slower than a tenth of its speed: less is the noise of its encoder. The
+# search of a reference ends in a slow approach, whose speed is the device's own: it stands still below 7 um/s.
+STILL_S, STILL_SHARE, STILL_MM = 0.15, 0.1, 0.001
+# No stage of the right units is twice as fast as it was told; the wrong ones differ by 10, 25.4, 60 or 1000.
+TOO_FAST = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +63,13 @@ def stated_axis(section: Section) -> AxisSettings:
 
 @dataclass(frozen=True, slots=True)
 class _Motion:
-    """A commanded motion: its target (None while homing) and the time at which it must have ended."""
+    """A commanded motion: target (None while homing), times of its begin and latest end, its begin and its speed."""
 
     to_mm: float | None
+    began_s: float
     until_s: float
+    from_mm: float = 0.0
+    speed_mm_s: float = inf
 
 
 class SingleAxis(ABC):
@@ -78,16 +86,20 @@ class SingleAxis(ABC):
     """
 
     has_steps = False
+    # Whether the device knows its position; a device that can say so states it while it is asked whether it moves.
+    _homed = True
 
     def __init__(self, name: str, clock: Clock, settings: AxisSettings) -> None:
         self.name, self.limits = name, settings.limits
         self._clock, self._settings = clock, settings
         self._line = threading.RLock()  # keeps each question together with its answer
         self._refusal: Alarm | None = None
-        self._lost: Alarm | None = None
+        self._fault: Alarm | None = None
         self._motion: _Motion | None = None
         self._stops = 0
-        self._closed = False
+        self._closed = self._seen = False
+        # The position that the stage held last, since when, and by how much and how long it must be held.
+        self._held_mm, self._since_s, self._still_mm, self._still_s = inf, -inf, STILL_MM, STILL_S
 
     # Seven calls of a driver; positions are those of the device (mm).
 
@@ -135,30 +147,52 @@ class SingleAxis(ABC):
             moving, motion = bool(self._asked(self._moving)), self._motion
             if motion is None:
                 return moving
-            if moving:
-                if self._clock.now_s() > motion.until_s:
-                    self.stop()
-                    raise DeviceError(
-                        f"{self.name} must end its motion in time, but still moves: it was stopped; check that "
-                        "nothing blocks it, and that speed_mm_s and settling_s are those of the stage."
-                    )
-                return True
-            self._motion = None
-            return self._continues_home() if motion.to_mm is None else self._rests(motion.to_mm)
+            self._seen |= moving
+            if not moving and self._has_ended(motion):
+                self._motion = None
+                return self._continues_home() if motion.to_mm is None else self._rests(motion, motion.to_mm)
+            if self._clock.now_s() > motion.until_s:
+                self.stop()
+                raise DeviceError(
+                    f"{self.name} must end its motion in time, but still moves: it was stopped; check that "
+                    "nothing blocks it, and that speed_mm_s and settling_s are those of the stage."
+                )
+            return True
+
+    def _has_ended(self, motion: _Motion) -> bool:
+        """Whether a stage that reports no motion has ended its motion, rather than not begun it or reported it wrongly.
+
+        It has if it has reported motion before and is at its target, or if it stands still.
+        """
+        if self._stands_still():
+            return True
+        return self._seen and motion.to_mm is not None and abs(self._held_mm - motion.to_mm) <= self._near_mm + LOST_MM
+
+    def _stands_still(self) -> bool:
+        """Query the position, and state whether it is held for some time."""
+        # The time before the question: on a busy computer, the answer may be old when it is looked at.
+        asked_s = self._clock.now_s()
+        self._at_mm()
+        return asked_s - self._since_s >= self._still_s
 
     def _continues_home(self) -> bool:
         """Move from the reference to position 0, if they are not the same; return whether the stage moves on."""
-        if abs(self._at_mm()) <= self._near_mm:
+        at_mm = self._at_mm()
+        if abs(at_mm) <= self._near_mm:
             return False
-        self._start(0.0, min(HOMING_MM_S, self.limits.speed_mm_s))
+        self._start(at_mm, 0.0, min(HOMING_MM_S, self.limits.speed_mm_s))
         return True
 
-    def _rests(self, to_mm: float) -> bool:
-        """Compare the position at rest with the target; return that the stage does not move."""
+    def _rests(self, motion: _Motion, to_mm: float) -> bool:
+        """Compare position and duration of a motion with its target and speed; return that the stage does not move."""
         at_mm = self._at_mm()
+        way_mm, took_s = abs(at_mm - motion.from_mm), self._since_s - motion.began_s
         if abs(at_mm - to_mm) > self._near_mm + LOST_MM:
             words = f"it was sent to {to_mm:g} mm and rests at {at_mm:g} mm: steps were lost, or it was stopped by hand"
-            self._lost = Alarm("lost", f"{words}; home the stage")
+            self._fault = Alarm("lost", f"{words}; home the stage")
+        elif way_mm > 4.0 * self._still_mm and TOO_FAST * took_s * motion.speed_mm_s < way_mm:
+            words = f"it was told {motion.speed_mm_s:g} mm/s, but went {way_mm:.3g} mm within {took_s:.2g} s"
+            self._fault = Alarm("fast", f"{words}: its units of position or speed are not those that were stated")
         return False
 
     @property
@@ -168,15 +202,16 @@ class SingleAxis(ABC):
 
     @property
     def alarm(self) -> Alarm | None:
-        """Lost steps until the stage is homed, or the device's last refusal."""
-        return self._lost or self._refusal
+        """Lost steps or a wrong speed until the stage is homed, or the device's last refusal."""
+        return self._fault or self._refusal
 
     def home(self) -> None:
         """Go to the reference, then to position 0."""
         self._ready()
-        stops, self._lost = self._stops, None
+        stops, self._fault = self._stops, None
         self._do(self._go_home)
-        self._went(stops, _Motion(None, self._clock.now_s() + HOME_S))
+        began_s, self._still_mm, self._still_s = self._clock.now_s(), STILL_MM, STILL_S
+        self._went(stops, _Motion(None, began_s, began_s + HOME_S))
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
         """Refuse motions beyond the limits of the stage."""
@@ -186,9 +221,20 @@ class SingleAxis(ABC):
         """Begin to move to a position at a positive speed."""
         check_move(self.limits, to_mm, speed_mm_s)
         self._ready()
-        if self._lost is not None:
-            raise DeviceError(f"{self.name} must know its position, but {self._lost.words}. Nothing was moved.")
-        self._start(to_mm, speed_mm_s)
+        if self._fault is not None:
+            raise DeviceError(f"{self.name} must know its position, but {self._fault.words}. Nothing was moved.")
+        at_mm, low_mm, high_mm = self._at_mm(), self.limits.lower_mm, self.limits.upper_mm
+        if not (
+            self._homed and low_mm - LOST_MM <= at_mm + self._near_mm and at_mm - self._near_mm <= high_mm + LOST_MM
+        ):
+            has = (
+                f"stands at {at_mm:g} mm" if self._homed else "has not searched its reference since it was switched on"
+            )
+            raise DeviceError(
+                f"{self.name} must stand within its range of {low_mm:g} to {high_mm:g} mm before it moves, but {has}: "
+                "home it, and check zero_mm and the units. Nothing was moved."
+            )
+        self._start(at_mm, to_mm, speed_mm_s)
 
     def jog(self, speed_mm_s: float) -> None:
         """Begin to move until stopped or until a limit is reached."""
@@ -236,23 +282,30 @@ class SingleAxis(ABC):
         if self.busy:
             raise StateError("The stage must be at rest before a new motion, but is still moving: stop it first.")
 
-    def _start(self, to_mm: float, speed_mm_s: float) -> None:
-        stops, settings = self._stops, self._settings
-        seconds = abs(to_mm - self._at_mm()) / speed_mm_s + self.limits.settling_s
+    def _start(self, at_mm: float, to_mm: float, speed_mm_s: float) -> None:
+        stops, settings, began_s = self._stops, self._settings, self._clock.now_s()
+        seconds = abs(to_mm - at_mm) / speed_mm_s + self.limits.settling_s
+        self._still_mm = STILL_SHARE * STILL_S * speed_mm_s
+        # An encoder shows no motion between two of its steps.
+        self._still_s = max(STILL_S, 2.0 * self.limits.encoder_step_mm / speed_mm_s)
         self._do(lambda: self._begin(settings.zero_mm + settings.sign * to_mm, speed_mm_s))
-        self._went(stops, _Motion(to_mm, self._clock.now_s() + PATIENCE * seconds + PATIENCE_S))
+        until_s = self._clock.now_s() + PATIENCE * seconds + PATIENCE_S
+        self._went(stops, _Motion(to_mm, began_s, until_s, at_mm, speed_mm_s))
 
     def _went(self, stops: int, motion: _Motion) -> None:
         """Note a motion that was begun; a stop that came while it was begun is repeated, because it came too early."""
-        self._motion = motion
+        self._motion, self._seen, self._since_s = motion, False, self._clock.now_s()
         if self._stops != stops:
             self.stop()
 
     def _at_mm(self) -> float:
         position_mm = self._asked(self._position_mm)
-        if not isfinite(position_mm) or abs(position_mm) == inf:
+        if not isfinite(position_mm):
             raise DeviceError(f"{self.name} must answer with its position, but answered {position_mm}.")
-        return (position_mm - self._settings.zero_mm) * self._settings.sign
+        at_mm = (position_mm - self._settings.zero_mm) * self._settings.sign
+        if abs(at_mm - self._held_mm) > self._still_mm:
+            self._held_mm, self._since_s = at_mm, self._clock.now_s()
+        return at_mm
 
     def _do(self, act: Callable[[], None]) -> None:
         """Send a command; an accepted command ends an earlier refusal."""

@@ -31,6 +31,8 @@ STOPPED, PAUSED = 0, 1  # SPMG: Stop, Pause, Move, Go
 CONNECTS_S, ANSWER_S = 5.0, 2.0
 # DMOV falls when the record is processed: within the scan of a slow server.
 BEGINS_S = 0.15
+# A record that holds a speed below this share of what was written has limited it; the rest is rounding.
+SLOWER = 0.99
 
 
 class MotorRecord(SingleAxis):
@@ -93,6 +95,8 @@ class MotorRecord(SingleAxis):
         if (state := self._get("SPMG")) in (STOPPED, PAUSED):
             raise RefusedError("SPMG", f"that it is {'stopped' if state == STOPPED else 'paused'} (SPMG): set it to Go")
         self._set("VELO", speed_mm_s * self._per_mm, wait=True)
+        if (held := self._get("VELO") / self._per_mm) < SLOWER * speed_mm_s:
+            raise RefusedError("VELO", f"a speed of at most {held:g} mm/s (VMAX) when it was told {speed_mm_s:g} mm/s")
         self._set("VAL", to_mm * self._per_mm)
         self._began_s = self._clock.now_s()
 

@@ -33,14 +33,14 @@ BAUD = 115_200
 HOST, UNIT, HAS_DATA = 0x01, 0x50, 0x80
 HEADER = struct.Struct("<HBBBB")
 # Messages (section 4 and 5 of the protocol).
-ENABLE, HOME, MOVE_ABSOLUTE, STOP = 0x0210, 0x0443, 0x0453, 0x0465
+ASK_INFO, INFO, ENABLE, HOME, MOVE_ABSOLUTE, STOP = 0x0005, 0x0006, 0x0210, 0x0443, 0x0453, 0x0465
 SET_SPEED, ASK_SPEED, SPEED = 0x0413, 0x0414, 0x0415
 ASK_POSITION, POSITION, ASK_STATUS, STATUS = 0x0411, 0x0412, 0x0429, 0x042A
 AT_ONCE = 1
 SPEEDS, TARGET = struct.Struct("<Hiii"), struct.Struct("<Hi")
-STATE = struct.Struct("<HI")
+STATE, SERIAL_NUMBER = struct.Struct("<HI"), struct.Struct("<I")
 MOVES = 0x10 | 0x20 | 0x40 | 0x80 | 0x200  # forward, reverse, jogging either way, homing
-OFF_COURSE = 0x4000  # excessive position error
+HOMED, OFF_COURSE = 0x400, 0x4000  # excessive position error
 PERIODS_S = {"dc_servo": 2048 / 6e6, "brushless": 102.4e-6, "stepper": 0.0}
 """Sampling period T of a servo's position loop: speed in counts/s times 65536 T (section 8). A stepper's controller
 counts 53.68 units for a microstep per second, and 1/90.9 for a microstep per second squared."""
@@ -76,6 +76,8 @@ class KinesisStage(SingleAxis):
             (servo, servo * period_s) if period_s else (STEPPER_SPEED, STEPPER_ACCELERATION)
         )
         self._rest = b""
+        number = self._asked(lambda: SERIAL_NUMBER.unpack_from(self._ask(ASK_INFO, INFO))[0])
+        self.name = f"Thorlabs controller {number} at {port.port}, channel {channel}"
         self._asked(lambda: self._send(ENABLE, channel, 1))
         held = self._asked(lambda: SPEEDS.unpack_from(self._ask(ASK_SPEED, SPEED)))
         self._acceleration = (
@@ -86,6 +88,7 @@ class KinesisStage(SingleAxis):
         bits = STATE.unpack_from(self._ask(ASK_STATUS, STATUS))[1]
         if bits & OFF_COURSE:
             raise RefusedError("0x4000", "an excessive position error: the stage is blocked or too heavily loaded")
+        self._homed = bool(bits & HOMED)
         return bool(bits & MOVES)
 
     def _position_mm(self) -> float:

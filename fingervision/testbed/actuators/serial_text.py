@@ -6,7 +6,6 @@ hardware.
 """
 
 import re
-from math import inf
 from pathlib import Path
 
 from fingervision.storage.toml_section import Section
@@ -28,8 +27,6 @@ __all__ = ["KEYS", "SIMULATED", "TextStage", "build", "without_hardware"]
 KEYS = (*line.KEYS, *AXIS)
 SIMULATED = False
 NEEDED = ("position", "move", "stop")
-# A controller without a word for its state counts as at rest when its position has not changed for this time.
-STILL_S = 0.15
 
 
 class TextStage(SingleAxis):
@@ -54,9 +51,8 @@ class TextStage(SingleAxis):
         self._talk, self._actions = conversation, words.actions
         # Reply that ends a command which the controller answers only when it is done.
         self._awaited: re.Pattern[str] | None = None
-        self._last_mm, self._since_s = 0.0, -inf
-        self._position_mm()
-        self._since_s = -inf  # at rest until it is told to move
+        self._last_mm = 0.0
+        self._at_mm()
 
     def _moving(self) -> bool:
         if self._awaited is not None:
@@ -65,10 +61,7 @@ class TextStage(SingleAxis):
             self._awaited = None
         busy = self._actions.get("busy")
         if busy is None:
-            # The time before the question: on a busy computer, the answer may be old when it is looked at.
-            asked_s = self._clock.now_s()
-            self._position_mm()
-            return asked_s - self._since_s < STILL_S
+            return not self._stands_still()
         found = self._talk.ask(busy)
         if "moving_bits" in busy.more:
             return bool(int(number_in(found, self.name)) & int(busy.more["moving_bits"]))
@@ -79,10 +72,8 @@ class TextStage(SingleAxis):
         if self._awaited is not None:  # the controller does not listen until it is done
             return self._last_mm
         asked = self._actions["position"]
-        at_mm = number_in(self._talk.ask(asked), self.name) / float(asked.more.get("per_mm", 1.0))
-        if at_mm != self._last_mm:
-            self._last_mm, self._since_s = at_mm, self._clock.now_s()
-        return at_mm
+        self._last_mm = number_in(self._talk.ask(asked), self.name) / float(asked.more.get("per_mm", 1.0))
+        return self._last_mm
 
     def _go_home(self) -> None:
         home = self._actions.get("home")
@@ -95,13 +86,11 @@ class TextStage(SingleAxis):
             self._awaited = home.reply
         else:
             self._command(home, {})
-        self._since_s = self._clock.now_s()
 
     def _begin(self, to_mm: float, speed_mm_s: float) -> None:
         move = self._actions["move"]
         per_mm, per_mm_s = (float(move.more.get(key, 1.0)) for key in ("per_mm", "speed_per_mm_s"))
         self._command(move, {"to": to_mm * per_mm, "speed": speed_mm_s * per_mm_s})
-        self._since_s = self._clock.now_s()
 
     def _halt(self) -> None:
         stop, home = self._actions["stop"], self._actions.get("home")
@@ -133,7 +122,8 @@ def build(section: Section, context: BuildContext) -> TextStage:
     settings, words = stated_axis(section), words_of(section, context.folder, NEEDED)
     conversation = opened_line(section, words)
     try:
-        name = f"{words.name} at {section.word('port')}"
+        identity = f" ({conversation.identity})" if conversation.identity else ""
+        name = f"{words.name}{identity} at {section.word('port')}"
         return TextStage(conversation, words, name, context.clock, settings).at_rest()
     except BaseException:
         conversation.close(None)

@@ -26,7 +26,7 @@ __all__ = ["KEYS", "SIMULATED", "StandaStage", "build", "without_hardware"]
 KEYS = ("device", "step_mm", "acceleration_mm_s2", "homes", *AXIS)
 SIMULATED = False
 # Flags of the status (libximc, "Status": MvCmdSts and Flags).
-ERROR, RUNNING, ALARM = 0x40, 0x80, 0x40
+ERROR, RUNNING, ALARM, HOMED = 0x40, 0x80, 0x40, 0x20
 
 
 class StandaStage(SingleAxis):
@@ -48,7 +48,7 @@ class StandaStage(SingleAxis):
         self, axis: Any, acceleration_mm_s2: float | None, name: str, clock: Clock, settings: AxisSettings, *,
         homes: bool,
     ) -> None:  # fmt: skip
-        super().__init__(f"Standa controller at {name}", clock, settings)
+        super().__init__(f"Standa controller {axis.get_serial_number()} at {name}", clock, settings)
         self._axis, self._acceleration, self._homes = axis, acceleration_mm_s2, homes
         self._device = threading.Lock()  # keeps the messages of two threads apart
         self._at_mm()
@@ -61,6 +61,7 @@ class StandaStage(SingleAxis):
         status = self._status()
         if int(status.MvCmdSts) & ERROR or int(status.Flags) & ALARM:
             raise RefusedError("alarm", "an alarm or a failed motion: see XiLab, and clear it there")
+        self._homed = not self._homes or bool(int(status.Flags) & HOMED)
         return bool(int(status.MvCmdSts) & RUNNING)
 
     def _position_mm(self) -> float:

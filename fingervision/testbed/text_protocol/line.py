@@ -14,7 +14,8 @@ from fingervision.testbed.actuator import RefusedError
 from fingervision.testbed.text_protocol.words import Exchange, Words, filled
 
 KEYS = ("words", "port", "baud", "set")
-TRIES = 2
+IDENTITY = "identity"
+TRIES, LATE_S = 2, 0.1
 """A question is asked again once, because one line in a noisy cable may be spoilt; a command never is."""
 
 
@@ -148,6 +149,9 @@ class Line:
                 if attempt == TRIES - 1:
                     raise
             else:
+                # The answer to the first question may follow; it must not be taken for that to the next one.
+                while attempt and exchange.say and self._heard(LATE_S):
+                    pass
                 if found is not None:
                     return found
         raise DeviceError(
@@ -179,6 +183,11 @@ class Line:
                     self.say(text, exchange, {})
         finally:
             self._port.close()
+
+    @property
+    def identity(self) -> str:
+        """What tells this instrument from others of its kind, such as a serial number; empty if its words keep none."""
+        return str(self._settings.get(IDENTITY, ""))
 
     def _all(self, values: Mapping[str, str | float]) -> dict[str, str | float]:
         return {**self._settings, **values}

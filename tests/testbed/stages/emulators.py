@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from operator import itemgetter
 from time import monotonic, sleep
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from fingervision.testbed.clocks.clock import VirtualClock
 
@@ -79,6 +79,10 @@ class Plant:
         with self._lock:
             self._from = self._to = self._at()
 
+    def stands_at(self, mm: float) -> None:
+        with self._lock:
+            self._from = self._to = mm
+
 
 class Emulator:
     """A controller behind a socket; `unplug` cuts the connection, and `plug` makes it possible again.
@@ -88,7 +92,7 @@ class Emulator:
 
     end = b"\n"
     immediate = b""
-    plugged: ClassVar[set["Emulator"]] = set()
+    plugged: ClassVar[set[Any]] = set()
 
     def __init__(self) -> None:
         self.plant, self.heard = Plant(), list[str]()
@@ -349,7 +353,7 @@ class Zaber(Emulator):
     """Zaber's ASCII protocol: microsteps, replies with the message's number, and with a checksum if it was sent one."""
 
     PER_MM, SPEED_UNIT = 10_000.0, 1.6384
-    maxspeed = 32_768
+    maxspeed, serial = 32_768, 55_123
 
     def __init__(self) -> None:
         super().__init__()
@@ -369,6 +373,8 @@ class Zaber(Emulator):
     def do(self, words: list[str]) -> tuple[str, str]:
         plant = self.plant
         match words:
+            case ["get", "system.serial"]:
+                return "OK", str(self.serial)
             case ["get", "maxspeed"]:
                 return "OK", str(self.maxspeed)
             case ["get", "pos"]:
@@ -481,7 +487,11 @@ PERIOD_S = 2048 / 6e6
 class Kinesis(Emulator):
     """Thorlabs KDC101: binary messages of the Host-Controller Communications Protocol, channel 1, unit 0x50."""
 
-    fault = 0
+    fault, serial = 0, 27_000_123
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.plant.homed = True
 
     def _take(self, data: bytes, client: socket.socket) -> bytes:
         while len(data) >= 6:
@@ -499,10 +509,12 @@ class Kinesis(Emulator):
     def message(self, number: int, first: int, second: int, data: bytes) -> bytes:
         plant = self.plant
         match number:
+            case 0x0005:
+                return struct.pack("<HHBBI80x", 0x0006, 84, 0x81, 0x50, self.serial)
             case 0x0210:
                 pass
             case 0x0443:
-                plant.homing = True
+                plant.homing = plant.homed = True
                 plant.go(0.0, 5.0)
             case 0x0465:
                 plant.halt()
@@ -528,4 +540,9 @@ class Kinesis(Emulator):
     def _bits(self) -> int:
         moves = self.plant.moves
         forward = self.plant.target > self.plant.at()
-        return 0x80000000 | self.fault | moves * (0x200 if self.plant.homing else 0x10 if forward else 0x20)
+        return (
+            0x80000000
+            | self.fault
+            | self.plant.homed * 0x400
+            | moves * (0x200 if self.plant.homing else 0x10 if forward else 0x20)
+        )

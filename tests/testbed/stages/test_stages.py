@@ -38,14 +38,14 @@ schema = 1
 kind = "triangle"
 from_mm = 0.0
 to_mm = 0.03
-speed_mm_s = 1.0
+speed_mm_s = 0.5
 [[step]]
 kind = "staircase"
 from_mm = 0.0
 to_mm = 0.45
 steps = {steps}
 dwell_s = 0.0
-speed_mm_s = 2.0
+speed_mm_s = 0.5
 frames = {frames}
 """
 FEW, MANY = RECIPE.format(steps=2, frames=10), RECIPE.format(steps=9, frames=33)
@@ -112,7 +112,7 @@ def test_the_stage_keeps_the_contract(case: Case, device: Any, virtual: None, tm
 
 
 def test_a_stop_in_motion_stops_the_stage_while_it_is_asked(bed: Bed) -> None:
-    bed.actuator.move(5.0, 2.0)
+    bed.actuator.move(5.0, min(2.0, bed.actuator.limits.speed_mm_s))
     assert bed.actuator.busy  # and the device has heard it before any virtual time passes
     stopped, answers = threading.Event(), list[float]()
 
@@ -136,12 +136,12 @@ def test_a_stop_in_motion_stops_the_stage_while_it_is_asked(bed: Bed) -> None:
     wait(bed, 0.15)
     assert bed.actuator.readings()[-1].value == pytest.approx(at_mm, abs=0.002)
     assert bed.actuator.alarm is None
-    bed.actuator.move(at_mm + 0.02, 1.0)  # the next motion is accepted
+    bed.actuator.move(at_mm + 0.02, 0.5)  # the next motion is accepted
 
 
 def test_beyond_the_limits_nothing_moves(bed: Bed) -> None:
     before_mm = bed.actuator.readings()[-1].value
-    for to_mm, mm_s in ((8.1, 1.0), (-2.1, 1.0), (1.0, 5.1)):
+    for to_mm, mm_s in ((8.1, 0.5), (-2.1, 0.5), (1.0, 1.01 * bed.actuator.limits.speed_mm_s)):
         with pytest.raises(LimitError, match="nothing was moved"):
             bed.actuator.move(to_mm, mm_s)
     assert not bed.actuator.busy
