@@ -120,10 +120,10 @@ def names_of(record: Any) -> tuple[str, ...]:
 def reference_table(*records: Any) -> str:
     """Return the reference table of a format's fields in Markdown: name, unit, meaning with limits and default.
 
-    Fields that differ only in their names (`left_mm`, `right_mm`) stand in one row.
+    Fields that differ only in their names (`left_mm`, `right_mm`) stand in one row, as does a field of several records.
     """
     rows: dict[tuple[str, str], list[str]] = {}
     for each in (each for record in records for each in declared(record)):
         rows.setdefault((each.field.unit, each.field.meaning), []).append(f"`{each.name}`")
-    lines = [f"| {', '.join(names)} | {unit} | {meaning} |" for (unit, meaning), names in rows.items()]
+    lines = [f"| {', '.join(dict.fromkeys(names))} | {unit} | {meaning} |" for (unit, meaning), names in rows.items()]
     return "\n".join(["| field | unit | meaning |", "|---|---|---|", *lines])

@@ -12,11 +12,12 @@ reach_px = 12.0                      # largest motion between frames; nothing si
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.field import names_of
 from fingervision.gauges.kinds import Kind, Spec, kind_named, kinds
 from fingervision.storage.toml_section import Section, read_document, refuse_other_file
 
@@ -125,8 +126,10 @@ def gauge_of(section: Section, others: Collection[str]) -> Gauge:
         section.refuse("name", f"must be unique in the file, but {name!r} occurs twice: rename one of the gauges.")
     kind_name = section.word("kind", of=kinds())
     kind = kind_named(kind_name)
-    section.only(("name", "kind", *kind.KEYS))
-    return Gauge(name, kind_name, kind.read(section))
+    keys = names_of(kind.SPEC)
+    section.only(("name", "kind", *keys))
+    own = {key: value for key, value in section.values.items() if key in keys}
+    return Gauge(name, kind_name, replace(section, values=own).record(kind.SPEC))
 
 
 def check_gauges(gauges: tuple[Gauge, ...], width_px: int, height_px: int) -> None:

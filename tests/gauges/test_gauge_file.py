@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from fingervision.domain.errors import DataError, InputFileError
+from fingervision.domain.field import names_of
 from fingervision.gauges.gauge_file import Gauge, check_gauges, read_gauges
 from fingervision.gauges.kinds import kind_named, kinds
 
@@ -75,6 +76,6 @@ def test_every_kind_says_what_it_reads_and_gives() -> None:
     assert {"gap", "edge", "pair", "line"} <= set(kinds())
     for name in kinds():
         kind = kind_named(name)
-        assert {"x_px", "y_px"} <= set(kind.KEYS)
+        assert {"x_px", "y_px"} <= set(names_of(kind.SPEC))
         assert kind.QUANTITIES
         assert all(sort in ("length", "angle") for _, sort in kind.QUANTITIES)

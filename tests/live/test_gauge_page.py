@@ -8,6 +8,7 @@ import time
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -16,11 +17,11 @@ import pytest
 
 from calib.calibration import BareScale
 from fingervision.domain.errors import DataError, FingervisionError, StateError
-from fingervision.gauges.fields import fields_of
 from fingervision.gauges.gauge_file import read_gauges
 from fingervision.gauges.kinds import kind_named, kinds
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey, section
+from fingervision.live.commands.gauges import settings_of
 from fingervision.live.playback.gauge_board import ChangedMeanwhileError, FieldError
 from fingervision.live.playback.gauges_beside import GaugesBeside, put_gauges_beside
 from fingervision.live.playback.playback import Playback
@@ -81,8 +82,7 @@ Opened = Callable[..., tuple[Playback, GaugesBeside]]
 
 @pytest.mark.parametrize("name", kinds())
 def test_a_kind_says_all_its_keys_and_a_gauge_of_usual_values_can_be_meant(name: str, opened_on: Opened) -> None:
-    fields = fields_of(name)
-    assert tuple(field.key for field in fields) == kind_named(name).KEYS
+    fields = [SimpleNamespace(**each) for each in settings_of(kind_named(name).SPEC)]
     for field in fields:
         assert field.choices or (field.low is not None and field.high is not None)
         assert field.default is None or not field.choices or field.default in field.choices

@@ -16,6 +16,7 @@ from fingervision import storage
 from fingervision.domain import gripper
 from fingervision.domain.errors import DataError
 from fingervision.domain.field import Declared, Field, declared, reference_table
+from fingervision.gauges.kinds import kind_named, kinds
 from fingervision.storage.row_file import RowFile, row_of
 from fingervision.storage.toml_section import Section
 
@@ -50,6 +51,10 @@ def test_the_reference_page_states_the_fields_as_they_are_declared(record: Any) 
     assert all(each.field.meaning for each in declared(record))
     table = reference_table(record)
     assert table in PAGE, f"docs/reference/file_formats.md must hold this table of {record.__name__}:\n{table}"
+
+
+def test_the_reference_page_states_the_settings_of_every_kind_of_gauge() -> None:
+    assert reference_table(*(kind_named(name).SPEC for name in kinds())) in PAGE
 
 
 @pytest.mark.parametrize("record", ROWS, ids=name_of)

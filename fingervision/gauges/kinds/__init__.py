@@ -1,4 +1,4 @@
-"""Kinds of gauges, one per module, each with `KEYS`, `QUANTITIES` and `read(section)`, which returns a `Spec`."""
+"""Kinds of gauges, one per module, each with `SPEC`, the record of its settings, and `QUANTITIES`."""
 
 import importlib
 import pkgutil
@@ -7,7 +7,6 @@ from typing import Any, Protocol
 
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.reading import Reading
-from fingervision.storage.toml_section import Section
 
 
 class Follower(Protocol):
@@ -34,12 +33,8 @@ class Spec(Protocol):
 class Kind(Protocol):
     """Protocol of a module that defines a kind of gauge."""
 
-    KEYS: tuple[str, ...]
+    SPEC: type[Spec]
     QUANTITIES: tuple[tuple[str, str], ...]
-
-    def read(self, section: Section) -> Spec:
-        """Read the settings of one gauge; the error for a value that is not allowed names the setting."""
-        ...
 
 
 def kinds() -> tuple[str, ...]:

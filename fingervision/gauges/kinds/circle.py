@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 from math import ceil, hypot, sqrt
+from typing import Annotated
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.gauges import common_keys
+from fingervision.domain.field import Field
+from fingervision.gauges.common_keys import REACH_PX, Placed, Reach
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance, Position
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
@@ -22,13 +24,11 @@ from fingervision.gauges.straight_edge import (
     MOST_OF_KNOWN,
     MOST_TIMES,
 )
-from fingervision.storage.toml_section import Section
 from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle
 from fingervision.vision.response_shift import u_edge_px
 from fingervision.vision.straight_edge_fit import reach_px
 from fingervision.vision.template_search import BEYOND_PX, Template
 
-KEYS = ("x_px", "y_px", "diameter_px", "reach_px", "polarity")
 QUANTITIES = (("x", "length"), ("y", "length"), ("diameter", "length"))
 POLARITIES = {"any": 0, "light": 1, "dark": -1}
 SMALLEST_PX, LARGEST_PX = 5.0, 5000.0
@@ -45,27 +45,21 @@ MOST_UNROUND = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class CircleSpec:
+class CircleSpec(Placed):
     """Settings of a circle gauge: centre and diameter in the first frame, largest motion, and dark or light."""
 
-    middle_px: tuple[float, float]
-    diameter_px: float
-    reach_px: float
-    polarity: int
+    diameter_px: Annotated[float, Field("diameter of a `circle`", "px", low=SMALLEST_PX, high=LARGEST_PX)]
+    reach_px: Reach = REACH_PX
+    polarity: Annotated[str, Field("of a `circle`: `any` (the default), `light` or `dark`", of=tuple(POLARITIES))] = (
+        "any"
+    )
 
     def follower(self) -> "FollowedCircle":
         """Return a new follower, for the first frame of a recording."""
         return FollowedCircle(self)
 
 
-def read(section: Section) -> CircleSpec:
-    """Read the settings of one gauge."""
-    return CircleSpec(
-        common_keys.middle(section),
-        section.number("diameter_px", low=SMALLEST_PX, high=LARGEST_PX),
-        common_keys.reach(section),
-        POLARITIES[section.word("polarity", "any", of=POLARITIES)],
-    )
+SPEC = CircleSpec
 
 
 class FollowedCircle:
@@ -139,7 +133,7 @@ class FollowedCircle:
             return GaugeStatus.BLURRED, ""
         if abs(found.contrast) < CONTRAST_FLOOR * picture.top or found.noise > MOST_NOISE * abs(found.contrast):
             return GaugeStatus.NOT_FOUND, "the outline has too little contrast"
-        if self._spec.polarity * found.contrast < 0.0:
+        if POLARITIES[self._spec.polarity] * found.contrast < 0.0:
             return GaugeStatus.NOT_FOUND, "the disc has the opposite polarity"
         if found.least_piece < LEAST_PIECE or found.unround_px > MOST_UNROUND * radius:
             return GaugeStatus.NOT_FOUND, "the outline is not a complete circle"
@@ -182,7 +176,7 @@ class FollowedCircle:
             after = (side - levels.shape[1] - before[0], side - levels.shape[0] - before[1])
             levels = np.pad(levels, ((before[1], after[1]), (before[0], after[0])), mode="edge")
         small = levels.reshape(2 * half + 1, by, 2 * half + 1, by).mean(axis=(1, 3)).astype(np.float32)
-        sign = self._spec.polarity if self._known is None else (1 if self._known.contrast > 0.0 else -1)
+        sign = POLARITIES[self._spec.polarity] if self._known is None else (1 if self._known.contrast > 0.0 else -1)
         best = None
         for share in tried:
             template = _disc(share * radius / by)

@@ -1,38 +1,40 @@
 """Position of one straight edge along a direction."""
 
 from dataclasses import dataclass
+from math import radians
 
-from fingervision.gauges.common_keys import EdgeKeys, edge_keys
+from fingervision.gauges.common_keys import POLARITIES, REACH_PX, Across, Length, Placed, Polarity, Reach
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Position
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
 from fingervision.gauges.straight_edge import Axes, EdgeFollower, NotFound
-from fingervision.storage.toml_section import Section
 
-KEYS = ("x_px", "y_px", "direction_deg", "length_px", "reach_px", "polarity")
 QUANTITIES = (("position", "length"),)
 
 
 @dataclass(frozen=True, slots=True)
-class EdgeSpec(EdgeKeys):
-    """Settings of an edge gauge; `direction_rad` is the direction in which the position is measured."""
+class EdgeSpec(Placed):
+    """Settings of an edge gauge; the direction is that in which the position is measured."""
+
+    direction_deg: Across
+    length_px: Length
+    reach_px: Reach = REACH_PX
+    polarity: Polarity = "any"
 
     def follower(self) -> "FollowedEdge":
         """Return a new follower, for the first frame of a recording."""
         return FollowedEdge(self)
 
 
-def read(section: Section) -> EdgeSpec:
-    """Read the settings of one gauge."""
-    return EdgeSpec(*edge_keys(section, "direction_deg"))
+SPEC = EdgeSpec
 
 
 class FollowedEdge:
     """Tracks one edge through the frames of one recording."""
 
     def __init__(self, spec: EdgeSpec) -> None:
-        axes = Axes(*spec.middle_px, spec.direction_rad)
-        self._edge = EdgeFollower(axes, 0.0, spec.length_px, spec.reach_px, spec.polarity)
+        axes = Axes(*spec.middle_px, radians(spec.direction_deg))
+        self._edge = EdgeFollower(axes, 0.0, spec.length_px, spec.reach_px, POLARITIES[spec.polarity])
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""

@@ -2,40 +2,37 @@
 
 from dataclasses import dataclass, replace
 from math import ceil
+from typing import Annotated
 
+from fingervision.domain.field import Field
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.region import Region
-from fingervision.gauges import common_keys
+from fingervision.gauges.common_keys import LONGEST_PX, Placed
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
-from fingervision.storage.toml_section import Section
 from fingervision.vision.pipeline import measure_frame
 
-KEYS = ("x_px", "y_px", "width_px", "height_px")
 QUANTITIES = (("gap", "length"),)
 # Smallest region that can contain two fingers and the edges between them (`fingervision.vision.pipeline` refuses
 # smaller regions).
 SMALLEST_PX = 16.0
+SIZE = "size of the region of a `gap`"
 
 
 @dataclass(frozen=True, slots=True)
-class GapSpec:
+class GapSpec(Placed):
     """Settings of a gap gauge: centre and size of its region."""
 
-    middle_px: tuple[float, float]
-    width_px: float
-    height_px: float
+    width_px: Annotated[float, Field(SIZE, "px", low=SMALLEST_PX, high=LONGEST_PX)]
+    height_px: Annotated[float, Field(SIZE, "px", low=SMALLEST_PX, high=LONGEST_PX)]
 
     def follower(self) -> "FollowedGap":
         """Return a new follower, for the first frame of a recording."""
         return FollowedGap(self)
 
 
-def read(section: Section) -> GapSpec:
-    """Read the settings of one gauge."""
-    width, height = (section.number(key, low=SMALLEST_PX, high=common_keys.LONGEST_PX) for key in KEYS[2:])
-    return GapSpec(common_keys.middle(section), width, height)
+SPEC = GapSpec
 
 
 class FollowedGap:

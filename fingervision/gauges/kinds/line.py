@@ -1,33 +1,36 @@
 """Position and angle of a straight edge."""
 
 from dataclasses import dataclass
-from math import atan, cos, hypot, pi, sin, sqrt
+from math import atan, cos, hypot, pi, radians, sin, sqrt
+from typing import Annotated
 
-from fingervision.gauges.common_keys import EdgeKeys, edge_keys
+from fingervision.domain.field import Field
+from fingervision.gauges.common_keys import MOST_DEG, POLARITIES, REACH_PX, Length, Placed, Polarity, Reach
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Angle, Position
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
 from fingervision.gauges.straight_edge import Axes, EdgeFollower, NotFound
-from fingervision.storage.toml_section import Section
 
-KEYS = ("x_px", "y_px", "angle_deg", "length_px", "reach_px", "polarity")
 QUANTITIES = (("position", "length"), ("angle", "angle"))
 # Angle between line and search zone (as a slope) above which the zone is rotated, so that the profile stays sharp.
 TURN_AT = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class LineSpec(EdgeKeys):
-    """Settings of a line gauge; `direction_rad` is the direction of the line itself."""
+class LineSpec(Placed):
+    """Settings of a line gauge."""
+
+    angle_deg: Annotated[float, Field("angle of a `line`: 0 right, 90 down", "degrees", low=-MOST_DEG, high=MOST_DEG)]
+    length_px: Length
+    reach_px: Reach = REACH_PX
+    polarity: Polarity = "any"
 
     def follower(self) -> "FollowedLine":
         """Return a new follower, for the first frame of a recording."""
         return FollowedLine(self)
 
 
-def read(section: Section) -> LineSpec:
-    """Read the settings of one gauge."""
-    return LineSpec(*edge_keys(section, "angle_deg"))
+SPEC = LineSpec
 
 
 class FollowedLine:
@@ -38,11 +41,11 @@ class FollowedLine:
     """
 
     def __init__(self, spec: LineSpec) -> None:
-        self._angle_rad = spec.direction_rad
+        self._angle_rad = radians(spec.angle_deg)
         # The axis t is perpendicular to the line, so that the axis s has the direction of the line in the settings.
-        axes = Axes(*spec.middle_px, spec.direction_rad - 0.5 * pi)
+        axes = Axes(*spec.middle_px, self._angle_rad - 0.5 * pi)
         self._fixed = axes
-        self._edge = EdgeFollower(axes, 0.0, spec.length_px, spec.reach_px, spec.polarity)
+        self._edge = EdgeFollower(axes, 0.0, spec.length_px, spec.reach_px, POLARITIES[spec.polarity])
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""

@@ -2,21 +2,21 @@
 
 from dataclasses import dataclass
 from math import ceil, hypot, sqrt
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.gauges import common_keys
+from fingervision.domain.field import Field
+from fingervision.gauges.common_keys import REACH_PX, Placed, Reach
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Position
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
 from fingervision.gauges.straight_edge import CONTRAST_FLOOR, GUARD, MOST_TIMES
-from fingervision.storage.toml_section import Section
 from fingervision.vision.symmetry_fit import BEYOND_PX as WINDOW_BEYOND_PX
 from fingervision.vision.symmetry_fit import NoSymmetryError, Symmetric, fit_symmetry
 from fingervision.vision.template_search import BEYOND_PX, Template
 
-KEYS = ("x_px", "y_px", "size_px", "shape", "reach_px")
 QUANTITIES = (("x", "length"), ("y", "length"))
 SHAPES = ("dot", "cross", "corner")
 SMALLEST_PX, LARGEST_PX = 7.0, 301.0
@@ -40,27 +40,21 @@ LEAST_SURE_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class MarkerSpec:
+class MarkerSpec(Placed):
     """Settings of a marker gauge: centre in the first frame, window size, shape, and how far the mark may move."""
 
-    middle_px: tuple[float, float]
-    size_px: float
-    shape: str
-    reach_px: float
+    size_px: Annotated[
+        float, Field("side of a window that contains a `marker`", "px", low=SMALLEST_PX, high=LARGEST_PX)
+    ]
+    shape: Annotated[str, Field("of a `marker`: `dot`, `cross` or `corner`", of=SHAPES)]
+    reach_px: Reach = REACH_PX
 
     def follower(self) -> "FollowedMarker":
         """Return a new follower, for the first frame of a recording."""
         return FollowedMarker(self)
 
 
-def read(section: Section) -> MarkerSpec:
-    """Read the settings of one gauge."""
-    return MarkerSpec(
-        common_keys.middle(section),
-        section.number("size_px", low=SMALLEST_PX, high=LARGEST_PX),
-        section.word("shape", of=SHAPES),
-        common_keys.reach(section),
-    )
+SPEC = MarkerSpec
 
 
 class FollowedMarker:

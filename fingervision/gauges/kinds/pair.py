@@ -1,18 +1,18 @@
 """Distance of two parallel edges along a direction: the width of a bar, slot or link."""
 
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import hypot, radians, sqrt
+from typing import Annotated
 
-from fingervision.gauges import common_keys
+from fingervision.domain.field import Field
+from fingervision.gauges.common_keys import LONGEST_PX, REACH_PX, Across, Length, Placed, Reach
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
 from fingervision.gauges.straight_edge import Axes, EdgeFollower, EdgeFound, NotFound, fit_near
-from fingervision.storage.toml_section import Section
 from fingervision.vision.edge_search import StepCandidate
 from fingervision.vision.straight_edge_fit import reach_px
 
-KEYS = ("x_px", "y_px", "direction_deg", "distance_px", "length_px", "reach_px", "polarity")
 QUANTITIES = (("distance", "length"),)
 POLARITIES = {"any": (0, 0), "light": (1, -1), "dark": (-1, 1), "rising": (1, 1), "falling": (-1, -1)}
 # At a smaller distance (in standard deviations of the blur), contrast and distance of two edges cannot be
@@ -25,41 +25,34 @@ SAME_PX = 1.5
 
 
 @dataclass(frozen=True, slots=True)
-class PairSpec:
+class PairSpec(Placed):
     """Settings of a pair gauge: centre between the edges, direction across them, and their initial distance."""
 
-    middle_px: tuple[float, float]
-    direction_rad: float
-    distance_px: float
-    length_px: float
-    reach_px: float
-    polarities: tuple[int, int]
+    direction_deg: Across
+    distance_px: Annotated[float, Field("distance of the edges of a `pair`", "px", low=3.0, high=LONGEST_PX)]
+    length_px: Length
+    reach_px: Reach = REACH_PX
+    polarity: Annotated[
+        str,
+        Field("of a `pair`: as of an edge, or `light` or `dark`, the area between the edges", of=tuple(POLARITIES)),
+    ] = "any"
 
     def follower(self) -> "FollowedPair":
         """Return a new follower, for the first frame of a recording."""
         return FollowedPair(self)
 
 
-def read(section: Section) -> PairSpec:
-    """Read the settings of one gauge."""
-    return PairSpec(
-        common_keys.middle(section),
-        common_keys.angle(section, "direction_deg"),
-        section.number("distance_px", low=3.0, high=common_keys.LONGEST_PX),
-        common_keys.length(section),
-        common_keys.reach(section),
-        POLARITIES[section.word("polarity", "any", of=POLARITIES)],
-    )
+SPEC = PairSpec
 
 
 class FollowedPair:
     """Tracks two edges through the frames of one recording; edges near each other are fitted together."""
 
     def __init__(self, spec: PairSpec) -> None:
-        axes = Axes(*spec.middle_px, spec.direction_rad)
+        axes = Axes(*spec.middle_px, radians(spec.direction_deg))
         self._edges = [
             EdgeFollower(axes, side * 0.5 * spec.distance_px, spec.length_px, spec.reach_px, polarity)
-            for side, polarity in zip((-1.0, 1.0), spec.polarities, strict=True)
+            for side, polarity in zip((-1.0, 1.0), POLARITIES[spec.polarity], strict=True)
         ]
         for edge in self._edges:
             edge.first_reach_px = min(spec.reach_px, NEAR_OWN * spec.distance_px)

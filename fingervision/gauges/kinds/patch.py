@@ -3,24 +3,25 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, cos, hypot, sin, sqrt
+from typing import Annotated
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.gauges import common_keys
+from fingervision.domain.field import Field
+from fingervision.gauges.common_keys import REACH_PX, Placed, Reach
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Angle, Shift
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
-from fingervision.storage.toml_section import Section
 from fingervision.vision.patch_covariance import reference_covariance
 from fingervision.vision.patch_reference import MARGIN_PX, PatchReference, patch_reference
 from fingervision.vision.patch_registration import register
 from fingervision.vision.template_search import BEYOND_PX, Template, chance_correlation, high_pass_noise
 
-KEYS = ("x_px", "y_px", "width_px", "height_px", "reach_px")
 QUANTITIES = (("shift_x", "length"), ("shift_y", "length"), ("rotation", "angle"))
 SMALLEST_PX, LARGEST_PX = 9.0, 501.0
+SIZE = "size of a `patch`"
 # Smallest correlation of a patch with its template; noise of two thirds of the texture's standard deviation gives this
 # value. A coarse texture needs a higher correlation than chance would give; if chance gives more than the second value,
 # the patch is too small for its texture.
@@ -45,23 +46,19 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
-class PatchSpec:
+class PatchSpec(Placed):
     """Settings of a patch gauge: centre and size in the first frame, and how far the patch may move."""
 
-    middle_px: tuple[float, float]
-    width_px: float
-    height_px: float
-    reach_px: float
+    width_px: Annotated[float, Field(SIZE, "px", low=SMALLEST_PX, high=LARGEST_PX)]
+    height_px: Annotated[float, Field(SIZE, "px", low=SMALLEST_PX, high=LARGEST_PX)]
+    reach_px: Reach = REACH_PX
 
     def follower(self) -> "FollowedPatch":
         """Return a new follower, for the first frame of a recording."""
         return FollowedPatch(self)
 
 
-def read(section: Section) -> PatchSpec:
-    """Read the settings of one gauge."""
-    width, height = (section.number(key, low=SMALLEST_PX, high=LARGEST_PX) for key in ("width_px", "height_px"))
-    return PatchSpec(common_keys.middle(section), width, height, common_keys.reach(section))
+SPEC = PatchSpec
 
 
 class FollowedPatch:

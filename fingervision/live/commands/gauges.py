@@ -1,13 +1,14 @@
 """Requests about user-defined gauges: open, add, change, remove, load, save."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import MISSING, fields
+from math import isfinite
 from typing import Any
 
 from fingervision.domain.errors import ArgumentError, StateError, UsageError
+from fingervision.domain.field import declared
 from fingervision.domain.numbers import stated_number, to_number
-from fingervision.gauges.fields import fields_of
-from fingervision.gauges.kinds import kinds
+from fingervision.gauges.kinds import kind_named, kinds
 from fingervision.live.commands.asking import GREATEST, MOST_LETTERS, Answer, Request, shown, words
 from fingervision.live.live_gauges import put_live_gauges
 from fingervision.live.playback.gauge_board import USUAL_FILE, ChangedMeanwhileError, FieldError, GaugeBoard
@@ -17,6 +18,8 @@ from fingervision.live.session import Session
 from fingervision.live.view import View
 
 MOST_KEYS = 50
+# Initial value of a number that a new gauge needs; this size suits most objects in a picture.
+USUAL_PX = 40.0
 
 
 def _beside(view: View) -> GaugesBeside:
@@ -65,11 +68,21 @@ def _said(view: View, sentence: str = "") -> Answer:
 
 def _kinds(view: View, request: Request) -> Answer:
     """Return the kinds of gauges with their settings, for the browser page."""
-    return Answer(
-        more={
-            "kinds": {name: [{**asdict(field), "usual": field.usual} for field in fields_of(name)] for name in kinds()}
-        }
-    )
+    return Answer(more={"kinds": {name: settings_of(kind_named(name).SPEC) for name in kinds()}})
+
+
+def settings_of(spec: Any) -> list[dict[str, Any]]:
+    """Key, default, limits, permitted words and initial value of each setting of a kind of gauge, in order."""
+    found = []
+    for each, one in zip(declared(spec), fields(spec), strict=True):
+        default = None if one.default is MISSING else one.default
+        low, high = (limit if isfinite(limit) else None for limit in (each.field.low, each.field.high))
+        first = each.field.of[0] if each.field.of else min(max(USUAL_PX, each.field.low), each.field.high)
+        found.append({
+            "key": each.name, "default": default, "low": low, "high": high, "choices": each.field.of,
+            "usual": first if default is None else default,
+        })  # fmt: skip
+    return found
 
 
 def _open(view: View, request: Request) -> Answer:
