@@ -7,16 +7,18 @@ from threading import Lock
 from time import monotonic
 from typing import Any
 
+import numpy as np
 import simplejpeg
 
-from fingervision.domain.gap import NoGap
+from fingervision.domain.direction import Direction
+from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.live.commands import section
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.page_words import page_json
 from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.vision.overlay import draw_overlay
+from fingervision.vision.overlay import in_eight_bits
 
 JPEG_QUALITY = 85
 # Time for which a composed state is used again: all pages that show the same picture ask within this time.
@@ -25,7 +27,6 @@ STATE_FOR_S = 0.02
 ROWS_AT_ONCE = 3000
 # Number of rows that can be converted to text within a millisecond.
 ROWS_IN_A_MOMENT = 100
-_NOTHING = NoGap(Status.NO_FINGERS, "The scale is not known, so that nothing is measured yet.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +90,7 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
         "count": count,
         **measured,
         "state": state,
+        "overlay": None if seen is None else _overlay(seen.outcome),
         "messages": [[each.number, each.name, each.words] for each in said],
     }
     words = page_json(head).encode()
@@ -144,11 +146,26 @@ def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
     }
 
 
+def _overlay(outcome: GapMeasurement | NoGap | None) -> dict[str, Any]:
+    """Measured points of a picture: x, y, tip and slope of both edges, and the ends of a held part."""
+    held = None if outcome is None else outcome.held
+    ends = None if held is None else [held.left_x_px, held.left_y_px, held.right_x_px, held.right_y_px]
+    if not isinstance(outcome, GapMeasurement):
+        return {"edges": None, "held": ends}
+    return {
+        "edges": [[edge.x_px, edge.y_px, edge.tip_px, edge.slope] for edge in (outcome.left, outcome.right)],
+        "vertical": outcome.direction.is_vertical,
+        "root": 1 if outcome.direction in (Direction.UP, Direction.LEFT) else -1,
+        "held": ends,
+    }
+
+
 def _picture(seen: Seen) -> bytes:
-    """The picture with the measured points; the page itself shows frame number and value as text."""
-    drawn = draw_overlay(seen.frame, _NOTHING if seen.outcome is None else seen.outcome, "")
-    # OpenCV would need the order blue, green, red, and reordering the colours takes twice as long as the encoding.
-    return bytes(simplejpeg.encode_jpeg(drawn, JPEG_QUALITY, "RGB", "420"))
+    """The picture as JPEG; the page itself draws the measured points and shows frame number and value as text."""
+    levels = in_eight_bits(seen.frame.pixels)
+    if levels.ndim == 2:
+        return bytes(simplejpeg.encode_jpeg(levels[:, :, np.newaxis], JPEG_QUALITY, "GRAY"))
+    return bytes(simplejpeg.encode_jpeg(np.asarray(levels, np.uint8), JPEG_QUALITY, "RGB", "420"))
 
 
 def draw_beforehand(view: View) -> None:

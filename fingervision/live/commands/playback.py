@@ -106,7 +106,10 @@ def _playback(view: View) -> Playback:
 
 
 def _seek(view: View, request: Request) -> Answer:
-    _playback(view).seek(whole(request, "frame"))
+    """Show the frame of a number, or the frame nearest to a time."""
+    playback = _playback(view)
+    is_time = "time_s" in request
+    playback.seek(playback.frame_at(number(request, "time_s")) if is_time else whole(request, "frame"))
     return Answer()
 
 

@@ -2,8 +2,8 @@
 export const at = (id) => document.getElementById(id);
 export const token = new URLSearchParams(location.search).get("token") || "";
 
-// `state` is the server's newest word, `now` the newest row in figures.
-export const page = { state: null, now: null, paused: false };
+// `state` is the server's newest word, `now` the newest row in figures, `overlay` what was found in the picture shown.
+export const page = { state: null, now: null, overlay: null, paused: false };
 
 const listeners = new Map();
 export function listen(kind, act) {

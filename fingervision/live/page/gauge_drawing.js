@@ -135,4 +135,5 @@ let listenChosen = () => {};
 export function onChosen(act) { listenChosen = act; }
 listen("escape", () => { drag = null; board.local = null; stopDrawing(); });
 listen("now", draw);
+listen("zoomed", draw);
 

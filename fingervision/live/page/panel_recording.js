@@ -1,26 +1,32 @@
 // A recording: a slider, buttons and keys to step, play, mark a range and measure it.
-import { ask, at, listen, on, page, say } from "/page/bus.js";
+import { ask, at, listen, on, page, say, typed } from "/page/bus.js";
 import { key } from "/page/keys.js";
 import { gaps, nearest } from "/page/gap_data.js";
 import { view } from "/page/chart.js";
+import { marks } from "/page/time_ruler.js";
 
 const STEP_MANY = 25;
 let scrubbing = false, asked = 0;
+at("steps_bar").innerHTML = `
+  <button id="play" aria-keyshortcuts="Space">Play</button>
+  <button id="step_back" aria-label="One frame back" title="One frame back (←)">◀</button>
+  <button id="step_on" aria-label="One frame on" title="One frame on (→)">▶</button>
+  <label>frame <input id="go_frame" type="text" inputmode="decimal" autocomplete="off" aria-keyshortcuts="n"></label>
+  <label><input id="go_time" type="text" inputmode="decimal" autocomplete="off" data-step="0.1" aria-label="Time in seconds" aria-keyshortcuts="t"> s</label>
+  <select id="speed" aria-label="Speed"><option value="0.1">0.1×</option><option value="0.25">0.25×</option><option value="0.5">0.5×</option><option value="1" selected>1×</option><option value="2">2×</option><option value="4">4×</option><option value="8">8×</option><option value="10">10×</option></select>`;
 at("transport").innerHTML = `
-  <div id="recording_bar" class="row" hidden>
-    <button id="play" aria-keyshortcuts="Space">Play</button>
-    <button id="step_back" aria-label="One frame back" title="One frame back (←)">◀</button>
-    <button id="step_on" aria-label="One frame on" title="One frame on (→)">▶</button>
-    <input id="scrub" type="range" min="0" value="0" step="1" aria-label="Frame">
-    <label>speed <select id="speed"><option>0.1</option><option>0.25</option><option>0.5</option><option selected>1</option><option>2</option><option>5</option><option>10</option></select></label>
-    <span id="place" class="quiet"></span>
-    <span class="keys">
-      <button id="mark_first" aria-keyshortcuts="[">From here</button>
-      <button id="mark_last" aria-keyshortcuts="]">To here</button>
-      <button id="unmark">Unmark</button>
-      <button id="measure_range" aria-keyshortcuts="m">Measure</button>
-    </span>
-    <span id="range" class="quiet"></span>
+  <div id="recording_bar" hidden>
+    <div id="ruler_box"><canvas id="ruler" aria-hidden="true"></canvas><input id="scrub" type="range" min="0" value="0" step="1" aria-label="Frame"></div>
+    <div class="row">
+      <span id="place" class="quiet"></span>
+      <span id="range" class="quiet"></span>
+      <span class="keys">
+        <button id="mark_first" aria-keyshortcuts="[">From here</button>
+        <button id="mark_last" aria-keyshortcuts="]">To here</button>
+        <button id="unmark">Unmark</button>
+        <button id="measure_range" aria-keyshortcuts="m">Measure</button>
+      </span>
+    </div>
   </div>`;
 const playback = () => page.state && page.state.playback;
 const bare = (act) => () => (playback() ? act(playback()) : false);
@@ -45,6 +51,21 @@ on("scrub", "input", () => {
   if (performance.now() - asked > 40) { asked = performance.now(); ask({ do: "seek", frame: Number(at("scrub").value) }); }
 });
 on("scrub", "change", () => { scrubbing = false; ask({ do: "seek", frame: Number(at("scrub").value) }); });
+// A frame or a time that is typed; what is refused gives way to what is shown.
+const typedIn = { go_frame: "frame", go_time: "time_s" };
+for (const [id, name] of Object.entries(typedIn)) {
+  on(id, "change", () => { if (at(id).value.trim()) ask({ do: "seek", [name]: typed(at(id).value) }); fill(playback(), true); });
+  on(id, "focus", () => at(id).select());
+}
+function fill(now, anyway = false) {
+  const time = page.now && page.now.frame === now.frame && page.now.time_s !== null ? page.now.time_s : null;
+  if (anyway || document.activeElement !== at("go_frame")) at("go_frame").value = String(now.frame);
+  if (anyway || document.activeElement !== at("go_time")) at("go_time").value = time === null ? "" : time.toFixed(3);
+}
+function toMark(way) {
+  const { frame } = playback(), all = way > 0 ? marks() : marks().reverse(), next = all.find((each) => way * (each - frame) > 0);
+  if (next !== undefined) ask({ do: "seek", frame: next });
+}
 listen("picked", (time) => {
   const i = playback() ? nearest(time) : -1;
   if (i >= 0 && gaps.frame[i] !== null) ask({ do: "seek", frame: gaps.frame[i] });
@@ -55,6 +76,8 @@ key(["ArrowLeft", "ArrowRight"], "step through a recording, with Shift by 25 fra
   (playback() ? step((event.key === "ArrowLeft" ? -1 : 1) * (event.shiftKey ? STEP_MANY : 1)) : false));
 key(["Home", "End"], "first and last frame of a recording", (event) =>
   (playback() ? ask({ do: "seek", frame: event.key === "Home" ? 0 : playback().frames - 1 }) : false));
+key([",", "."], "previous and next mark of the ruler: turning point, failure, end of the range", (event) => (playback() ? toMark(event.key === "." ? 1 : -1) : false));
+key(["n", "t"], "type the frame or the time to go to", (event) => (playback() ? at(event.key === "n" ? "go_frame" : "go_time").focus() : false));
 key(["["], "mark a range from this frame on", bare(() => mark("first")));
 key(["]"], "mark a range up to this frame", bare(() => mark("last")));
 key(["m"], "measure the marked range, or all", bare(() => at("measure_range").click()));
@@ -62,7 +85,8 @@ key(["m"], "measure the marked range, or all", bare(() => at("measure_range").cl
 let last = "";
 listen("state", (state) => {
   const now = state.playback, live = !now;
-  at("recording_bar").hidden = live;
+  at("recording_bar").hidden = at("steps_bar").hidden = live;
+  document.body.classList.toggle("recorded", !live);
   for (const id of ["pause", "record", "follow"]) at(id).hidden = !live;
   for (const id of ["frame_number", "rate", "jitter", "dropped"]) at(id).parentElement.hidden = !live;
   if (live) return;
@@ -72,8 +96,10 @@ listen("state", (state) => {
   if (!scrubbing) at("scrub").value = String(now.frame);
   const progress = now.failure ? ` – ${now.failure}` : now.is_whole || state.px_per_mm === null ? "" : ` – measured ${now.measured}`;
   say("place", `frame ${now.frame} of ${now.frames}${progress}`);
+  at("place").title = at("place").textContent;
+  fill(now);
   say("range", now.range ? `marked ${now.range[0]} to ${now.range[1]}` : "");
-  at("unmark").hidden = !now.range;
+  at("unmark").classList.toggle("away", !now.range);
   say("measure_range", now.measuring ? "Measuring…" : now.range ? "Measure range" : "Measure all");
   at("measure_range").disabled = now.measuring;
   const drawn = `${now.frame} ${now.range}`;

@@ -62,7 +62,7 @@ async function take(buffer) {
   if (!page.paused) {
     // The value is that of the picture beside it, or of a newer frame where only now and then one is sent.
     drawing = true;
-    if (buffer.byteLength > 4 + length) await draw(new Uint8Array(buffer, 4 + length));
+    if (buffer.byteLength > 4 + length) await draw(new Uint8Array(buffer, 4 + length), head.overlay);
     drawing = false;
     lastAt = performance.now();
     if (!page.paused) tell("now", head.now);
@@ -70,7 +70,7 @@ async function take(buffer) {
   if (socket.readyState === WebSocket.OPEN) socket.send('{"do":"ack"}');
 }
 
-async function draw(bytes) {
+async function draw(bytes, overlay) {
   const canvas = at("picture");
   try {
     const picture = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
@@ -81,6 +81,7 @@ async function draw(bytes) {
     at("stage").style.setProperty("--aspect", String(picture.width / picture.height));
     canvas.getContext("2d").drawImage(picture, 0, 0);
     picture.close();
+    page.overlay = overlay; // of this picture, and of no other
     canvas.dataset.shown = String(Number(canvas.dataset.shown || 0) + 1);
     tell("picture");
   } catch { tell("message", "A picture could not be shown.", "picture"); }

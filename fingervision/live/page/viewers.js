@@ -1,7 +1,7 @@
 // Who works the live view: a page that only looks has no controls, and one whose pen another holds may take it over.
 import { ask, at, listen, on } from "/page/bus.js";
 
-const WORKS = ["record", "zero", "unzero", "snapshot", "drag_region", "whole", "tips", "below_tip", "play", "step_back", "step_on", "scrub", "speed", "mark_first", "mark_last", "unmark", "measure_range", "next_run", "inspect", "drag_height", "fingers", "save_settings", "drag_reference"];
+const WORKS = ["record", "zero", "unzero", "snapshot", "drag_region", "whole", "tips", "below_tip", "play", "step_back", "step_on", "scrub", "go_frame", "go_time", "speed", "mark_first", "mark_last", "unmark", "measure_range", "next_run", "inspect", "drag_height", "fingers", "save_settings", "drag_reference"];
 at("always").insertAdjacentHTML("beforebegin", '<span id="looks_on" class="badge unsure" hidden>looking on</span><button id="take_over" hidden>Take over</button>');
 on("take_over", "click", () => ask({ do: "take_over" }));
 let shown = null;

@@ -1,6 +1,7 @@
 """A recording in the browser page: display of frames while the recording is measured in the background."""
 
 import secrets
+from bisect import bisect_left
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -188,6 +189,12 @@ class Playback:
             self.frame = max(0, min(frame, self.frame_count - 1))
             self._requests += 1  # the same frame is read again, because its file may have been put back
             self._changed.notify_all()
+
+    def frame_at(self, time_s: float) -> int:
+        """Return the frame whose time is nearest to a time (s) of the recording."""
+        following = bisect_left(range(self.frame_count), time_s, key=self._time_of)
+        near = (max(0, following - 1), min(following, self.frame_count - 1))
+        return min(near, key=lambda frame: abs(self._time_of(frame) - time_s))
 
     def play(self, *, on: bool, speed: float) -> None:
         """Play from the displayed frame (from the beginning if it is the last), or pause.
