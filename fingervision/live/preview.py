@@ -104,7 +104,7 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
 
 
 def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
-    """Rows for the chart: time, gap, standard uncertainty, frame, reason for a missing gap, and the model's gap."""
+    """Rows for the chart: time, gap, u, frame, reason for no gap, u's random part if less, and the model's gap."""
     model = view.features.get("model")
     predicted: list[float | None] = [None] * len(rows)
     if model is not None:
@@ -117,6 +117,7 @@ def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
             _u_mm(row),
             row.frame,
             "" if row.status is Status.OK else row.status.value,
+            None if row.u_gap_mm is None else row.u_random_mm,
             *([] if gap_mm is None else [gap_mm]),
         ]
         for row, gap_mm in zip(rows, predicted, strict=True)
@@ -140,6 +141,7 @@ def _now(view: View, seen: Seen | None) -> dict[str, Any] | None:
         "words": getattr(seen.outcome, "words", ""),
         "gap_mm": row.gap_mm,
         "u_mm": _u_mm(row),
+        "u_random_mm": row.u_random_mm,
         "has_budget": row.u_gap_mm is not None,
         "zero_mm": choices.zero_mm,
         "verdict": choices.verdict(None if row.gap_mm is None else row.gap_mm - choices.zero_mm, _u_mm(row)),

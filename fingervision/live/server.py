@@ -22,6 +22,8 @@ from starlette.websockets import WebSocket
 from fingervision.domain.errors import FingervisionError, ProcessError, UsageError
 from fingervision.live.access import Access
 from fingervision.live.commands import modules
+from fingervision.live.commands.model import MODEL
+from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard, PatientProtocol
 from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
 from fingervision.live.pen import Pen
@@ -111,6 +113,8 @@ def index() -> str:
     return (PAGE / "index.html").read_text(encoding="utf-8").replace(SCRIPTS, tags)
 
 
+VERDICT_FILES = {"report.html": "attachment", "residuals.svg": "inline"}
+"""Files of a verdict that the page may fetch, and whether the browser shows or saves them."""
 MESSAGE_BYTES = 4096
 # Largest number of browser pages, each of which takes a share of a core, and of connections, which also fetch files.
 PAGES_AT_ONCE, CONNECTIONS_AT_ONCE = 32, 128
@@ -178,6 +182,7 @@ class Page:
                 Route("/page/{name}", self._file),
                 Route("/gaps.csv", self._gaps),
                 Route("/steps/{number}.png", self._step),
+                Route("/verdict/{name}", self._verdict),
                 WebSocketRoute("/socket", self._socket),
             ],
             exception_handlers={Exception: self._failed},
@@ -251,6 +256,15 @@ class Page:
         if picture is None:
             return PlainTextResponse("There is no such picture: ask for the steps first.", 404)
         return Response(picture, media_type="image/png")
+
+    async def _verdict(self, request: Request) -> Response:
+        """Send a file of the newest verdict; the report contains scripts, and is saved instead of opened here."""
+        name, comparison = request.path_params["name"], self._view.features.get(MODEL)
+        found = comparison.verdicts.newest if isinstance(comparison, Comparison) else None
+        path = None if found is None else Path(found.report).parent / name
+        if name not in VERDICT_FILES or path is None or not path.is_file():
+            return PlainTextResponse("There is no such file of a verdict.", 404)
+        return FileResponse(path, filename=name, content_disposition_type=VERDICT_FILES[name])
 
     async def _socket(self, page: WebSocket) -> None:
         if len(self._sockets) >= PAGES_AT_ONCE:

@@ -120,15 +120,17 @@ def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
     page = opened(view.address)
     shown(page, "Number(document.querySelector('#picture').dataset.shown) > 60")
 
-    # The cursor reads the chart, a drag zooms in, what comes in does not move it, and a key follows again.
+    # The cursor reads the chart, a drag with Shift zooms in, what comes in does not move it, and a key follows again.
     page.locator("#chart").scroll_into_view_if_needed()
     began_s, newest_s = under_cursor_s(page, 0.01), under_cursor_s(page, 0.99)
     box = page.locator("#chart .u-over").bounding_box()
     middle = box["y"] + box["height"] / 2
     page.mouse.move(box["x"] + 0.4 * box["width"], middle)
+    page.keyboard.down("Shift")
     page.mouse.down()
     page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=4)
     page.mouse.up()
+    page.keyboard.up("Shift")
     zoomed_s = (under_cursor_s(page, 0.02), under_cursor_s(page, 0.98))
     assert began_s < zoomed_s[0] < zoomed_s[1] < newest_s
     page.wait_for_timeout(500)

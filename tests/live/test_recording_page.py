@@ -1,21 +1,27 @@
 """The page of a recording in a browser: zoom, overlay, ruler, frames that are typed, graph, and typed numbers."""
 
+import csv
+import io
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import cv2
 import numpy as np
 import pytest
 
 from calib.calibration import BareScale
+from fingervision.live.beside import Beside, stand_beside
 from fingervision.live.choices import Choices
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
 from fingervision.live.server import Page, bound
+from fingervision.measuring.scale import stated_scale
 from fingervision.rendering import Camera, render, two_fingers
-from tests.live.browser import browser, needs_chromium, opened, shown
+from tests.live.browser import browser, drag, needs_chromium, opened, shown
 
 __all__ = ["browser", "opened"]
 pytestmark = [needs_chromium, pytest.mark.slow]
@@ -151,3 +157,154 @@ def test_picture_zooms_with_its_overlay_and_frames_are_found_by_number_time_and_
     page.click("#play")
     is_at(page, FRAMES - 1)
     assert page.locator("#frame").bounding_box() == frame
+
+
+@pytest.fixture
+def modelled(frames: Path, tmp_path: Path) -> Iterator[str]:
+    """Address of the page of the recording, with the log of a stage and a model that is wrong at one end."""
+    inputs = tmp_path / "drive.csv"
+    rows = [f"{number / RATE_HZ:.4f},{gap_px(number) / PX_PER_MM:.6f}" for number in range(FRAMES)]
+    inputs.write_text("\n".join(["time_s,input_mm", *rows]) + "\n")
+    model = tmp_path / "model.csv"
+    model.write_text("input_mm,gap_mm\n0,0\n3,3\n3.6,3.8\n")
+    log = ("--drive", str(inputs), "--drive-offset-s", "0")
+    scale = stated_scale(PX_PER_MM, 0.05)
+    view = Playback(recorded(str(frames), RATE_HZ, Choices(scale=scale), log), tmp_path / "out")
+    stand_beside(view, Beside(model=model))
+    page, end = Page(view, bound("127.0.0.1", 0)), Event()
+    view.start()
+    serving = Thread(target=page.serve, args=(end,), daemon=True)
+    serving.start()
+    yield page.address
+    end.set()
+    serving.join()
+    view.stop()
+
+
+def dragged(page: Any, chart: str, shares: tuple[float, float], *, shift: bool = False) -> None:
+    """Drag over a part of a chart."""
+    box = page.locator(f"{chart} .u-over").bounding_box()
+    if shift:
+        page.keyboard.down("Shift")
+    page.mouse.move(box["x"] + shares[0] * box["width"], box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(box["x"] + shares[1] * box["width"], box["y"] + box["height"] / 2, steps=4)
+    page.mouse.up()
+    if shift:
+        page.keyboard.up("Shift")
+
+
+def saved(page: Any, button: str) -> bytes:
+    with page.expect_download() as download:
+        page.click(button)
+    return Path(download.value.path()).read_bytes()
+
+
+def test_graph_measures_a_range_shows_the_residual_and_exports_what_is_seen(
+    modelled: str, opened: Callable[..., Any]
+) -> None:
+    page = opened(modelled, viewport={"width": 1280, "height": 720})
+    shown(page, WHOLE)
+    page.locator("#residual_chart .u-over").wait_for()
+    shown(page, "document.querySelector('#model_residual').textContent.includes('RMS')")
+    gap, residual = (page.locator(f"{each} .u-over").bounding_box() for each in ("#chart", "#residual_chart"))
+    assert residual["y"] >= gap["y"] + gap["height"]
+    assert residual["height"] > 30
+
+    # The model is wrong where the gap is widest, and a key leads to that frame.
+    page.locator("body").press("w")
+    is_at(page, WIDEST)
+    words = page.inner_text("#readout")
+    assert float(re.search(r"residual (-?[\d.]+)", words)[1]) == pytest.approx(
+        -1e3 / 3 * (gap_px(WIDEST) / 34 - 3), abs=5
+    )
+    # A click on a point of either chart shows its frame.
+    box = page.locator("#residual_chart .u-over").bounding_box()
+    page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 0.5 * box["height"])
+    is_at(page, round(0.25 * (FRAMES - 1)))
+
+    # A range: its mean and slope are those of the stroke, within what is stated.
+    dragged(page, "#chart", (0.1, 0.4))
+    words = page.inner_text("#range_words")
+    first, last = map(int, re.search(r"frames (\d+) to (\d+)", words).groups())
+    truth = [gap_px(number) / PX_PER_MM for number in range(first, last + 1)]
+    mean, u_mean = map(float, re.search(r"mean (\S+) ± (\S+) mm", words).groups())
+    slope, u_slope = map(float, re.search(r"slope (\S+) ± (\S+) mm/s", words).groups())
+    assert f"n = {len(truth)}" in words
+    assert "± at k = 2" in words
+    assert mean == pytest.approx(np.mean(truth), abs=2 * u_mean)
+    assert slope == pytest.approx(3.0 / PX_PER_MM * RATE_HZ, abs=2 * u_slope)
+    assert 0.0 < u_mean < 0.02
+    assert 0.0 < u_slope < 0.02
+    page.click("#range_mark")
+    shown(page, f"document.querySelector('#range').textContent === 'marked {first} to {last}'")
+
+    # What is seen is what is saved: rows, lines and pixels.
+    page.click("#range_zoom")
+    dragged(page, "#residual_chart", (0.2, 0.8), shift=True)
+    rows = list(csv.DictReader(io.StringIO(saved(page, "#save_seen").decode())))
+    numbers = [int(row["frame"]) for row in rows]
+    assert numbers == list(range(numbers[0], numbers[-1] + 1))
+    assert first < numbers[0] < numbers[-1] < last
+    for row in rows:
+        residual_mm = float(row["gap_mm"]) - float(row["model_mm"])
+        assert float(row["residual_mm"]) == pytest.approx(residual_mm, abs=2e-7)
+    drawing = ET.fromstring(saved(page, "#save_svg"))
+    names = {each.get("id") for each in drawing.iter("{http://www.w3.org/2000/svg}g")}
+    assert {"gap", "residual"} <= names
+    line = drawing.find(".//{*}g[@id='gap']/{*}polyline")
+    assert len(line.get("points").split()) == len(rows)
+    picture = cv2.imdecode(np.frombuffer(saved(page, "#save_plot"), np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape[1] == 2 * int(drawing.get("width"))
+    assert picture.std() > 1.0
+    page.locator("body").press("Escape")
+    assert page.locator("#range_bar").is_hidden()
+
+
+def test_numbers_are_taken_as_people_type_them_and_what_is_refused_goes_with_its_message(
+    served: str, opened: Callable[..., Any]
+) -> None:
+    page = opened(served, viewport={"width": 1280, "height": 720})
+    shown(page, WHOLE)
+    for field, words, state in (
+        ("#below_tip", "400 µm", "0.4"),
+        ("#below_tip", "0,3 mm", "0.3"),
+        ("#px_per_mm", "34,5", "34.5"),
+        ("#px_per_mm", "34,0 px/mm", "34"),
+    ):
+        typed(page, field, words)
+        shown(page, f"document.querySelector('{field}').value === '{state}'")
+    page.fill("#greatest", "5,5 mm")
+    typed(page, "#least", "0,5")
+    shown(
+        page, "document.querySelector('#least').value === '0.5' && document.querySelector('#greatest').value === '5.5'"
+    )
+
+    # What is refused stays to be mended, says why in words of the page, and goes with its message.
+    for field, words, why, state in (
+        ("#px_per_mm", "", "The scale must be a number, but is empty.", "34"),
+        ("#px_per_mm", "1,234", "write 1.234 or 1234", "34"),
+        ("#px_per_mm", "34 mm", "The scale must be in px/mm, but is in 'mm'.", "34"),
+        ("#below_tip", "-1", "The height below the tips must be positive", "0.3"),
+        ("#region_w", "1", "The region must be at least 8 pixels wide and high, but is 1x240 pixels.", "320"),
+    ):
+        typed(page, field, words)
+        page.locator("#panels .refused", has_text=why).wait_for()
+        assert "--" not in page.inner_text("#panels")
+        assert page.input_value(field) == words
+        page.press(field, "Escape")
+        assert page.input_value(field) == state
+        assert page.locator("#panels .refused", has_text=why).count() == 0
+    # A scale that doubles all gaps is asked about.
+    typed(page, "#px_per_mm", "12")
+    page.locator("button.sure").wait_for()
+    assert page.inner_text("#scale").startswith("34.0000")
+    page.click("button.sure")
+    shown(page, "document.querySelector('#scale').textContent.startsWith('12.0000')")
+
+    # A region of one pixel is refused in the picture, where it is drawn, and can be drawn again at once.
+    page.click("#drag_region")
+    drag(page, (100, 100, 1, 1))
+    assert "at least 8 each way" in page.inner_text("#hint")
+    drag(page, (10, 10, 300, 220))
+    shown(page, "document.querySelector('#region_w').value === '300'")

@@ -1,5 +1,6 @@
 """Checks of the values in a request, and the response to a request."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,11 +10,35 @@ from fingervision.domain.numbers import stated_number
 from fingervision.domain.region import Region
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.view import View
+from fingervision.tables.units import known_unit
 
 GREATEST = 10**12
 """Largest number in a request; the comparison with this limit is safe for any value, including NaN, whereas a
 conversion is not."""
 SIDES = ("column", "row", "width", "height")
+FIELDS = {
+    "px_per_mm": ("The scale", "px/mm"),
+    "u_px_per_mm": ("The uncertainty of the scale", "px/mm"),
+    "below_tip_mm": ("The height below the tips", "mm"),
+    "least": ("The lower limit", "mm"),
+    "greatest": ("The upper limit", "mm"),
+    "size_mm": ("The size", "mm"),
+    "u_size_mm": ("The uncertainty of the size", "mm"),
+    "input_mm": ("The input", "mm"),
+    "to_mm": ("The position", "mm"),
+    "speed_mm_s": ("The speed", "mm/s"),
+    "for_s": ("The time", "s"),
+    "time_s": ("The time", "s"),
+    "frame": ("The frame", ""),
+    **{side: (f"The region's {side}", "px") for side in SIDES},
+}
+"""What the page's user calls a number of a request, and its unit, which may be typed behind it."""
+MULTIPLES = {"mm": {"m": 1e3, "cm": 10.0, "um": 1e-3, "inch": 25.4}, "s": {"ms": 1e-3, "min": 60.0}}
+"""Other units of a length and of a time, by their names in `fingervision.tables.units`."""
+WITH_UNIT = re.compile(
+    r"(?P<number>[^a-zA-Z\u00b5\u03bc%]*\d(?:[eE][+-]?\d+)?)\s*(?P<unit>[a-zA-Z\u00b5\u03bc%][^\d]*)"
+)
+"""A number with a unit behind it: `0,3 mm`."""
 MOST_LETTERS = 1000
 """Largest length of a text in a request, such as a path or a name."""
 MOST_CHANGE = 2.0
@@ -62,19 +87,31 @@ class QuestionError(FingervisionError):
 
 
 def number(request: Request, name: str) -> float:
-    """Read a number from a request, also as a text with a decimal point or comma.
+    """Read a number from a request, also as a text with a decimal point or comma and a unit.
 
     Raises
     ------
     UsageError
-        The value is not a number, or a text that may be two different numbers.
+        The value is not a number, a text that may be two different numbers, or has another unit.
     """
-    value = request.get(name)
+    called, unit = FIELDS.get(name, (name, ""))
+    value, factor = request.get(name), 1.0
     if isinstance(value, str) and 0 < len(value) <= MOST_LETTERS:
-        value = stated_number(value, name)
+        if name in FIELDS and (found := WITH_UNIT.fullmatch(value.strip())) is not None:
+            value, factor = found["number"], _factor(found["unit"].strip(), unit, called)
+        value = stated_number(value, called)
     if not isinstance(value, bool) and isinstance(value, int | float) and abs(value) <= GREATEST:
-        return float(value)
-    raise UsageError(f"{name} must be a number, but is {shown(value)}.")
+        return float(value) * factor
+    raise UsageError(f"{called} must be a number, but is {shown(value)}.")
+
+
+def _factor(typed: str, unit: str, called: str) -> float:
+    """Factor from a typed unit to the unit of a field."""
+    multiples = MULTIPLES.get(unit, {})
+    factor = 1.0 if typed == unit else multiples.get(known_unit(typed) or "", 1.0 if known_unit(typed) == unit else 0.0)
+    if not factor:
+        raise UsageError(f"{called} must be {f'in {unit}' if unit else 'a number without unit'}, but is in {typed!r}.")
+    return factor
 
 
 def number_or_none(request: Request, name: str) -> float | None:
@@ -93,7 +130,7 @@ def whole(request: Request, name: str) -> int:
     value = number(request, name)
     if value.is_integer():
         return int(value)
-    raise UsageError(f"{name} must be a whole number, but is {value:g}.")
+    raise UsageError(f"{FIELDS.get(name, (name,))[0]} must be a whole number, but is {value:g}.")
 
 
 def words(request: Request, name: str) -> str:

@@ -70,11 +70,19 @@ def calibrated(frame: Frame, region: Region, kind: str, size_mm: float, u_size_m
 
 
 POLARITIES = ("auto", "dark", "light")
+LEAST_REGION_PX = 8
+"""Smallest side of a region that is set on the page, as in `page/dragging.js`: no finger is seen in less."""
 TIPS = ("auto", *(direction.value for direction in Direction))
 
 
 def _region(view: View, request: Request) -> Answer:
-    view.choose(region=None if request.get("box") is None else box(request))
+    region = None if request.get("box") is None else box(request)
+    if region is not None and 0 < min(region.width_px, region.height_px) < LEAST_REGION_PX:
+        raise UsageError(
+            f"The region must be at least {LEAST_REGION_PX} pixels wide and high, but is "
+            f"{region.width_px}x{region.height_px} pixels."
+        )
+    view.choose(region=region)
     return Answer()
 
 
@@ -138,7 +146,7 @@ def _limits(view: View, request: Request) -> Answer:
 def _scale(view: View, request: Request) -> Answer:
     px_per_mm, u_px_per_mm = number(request, "px_per_mm"), number_or_none(request, "u_px_per_mm")
     if px_per_mm <= 0.0:
-        raise UsageError(f"px_per_mm must be positive, but is {px_per_mm:g}.")
+        raise UsageError(f"The scale must be positive, but is {px_per_mm:g} px/mm.")
     check_scale(view, px_per_mm, request)
     view.choose(scale=stated_scale(px_per_mm, u_px_per_mm), scale_file=None)
     return Answer()

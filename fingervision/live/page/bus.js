@@ -46,19 +46,40 @@ document.addEventListener("keydown", (event) => {
   input.value = String(Number((value + sign * Number(input.dataset.step || 1)).toFixed(6)));
   input.dispatchEvent(new Event("change"));
 });
-// A refusal or a question is shown beside the form that asked.
+// A refusal or a question is shown beside the form that asked. What was refused stays to be mended while its form is in
+// focus; when that is left, `restore` puts the values in force back, and the message goes with what it was about.
 const askedBy = new Map();
-export function submit(id, act) {
-  const form = at(id), words = document.createElement("p");
+export function beside(form, restore = () => {}) {
+  const words = document.createElement("p");
   words.className = "refused";
   words.setAttribute("role", "status");
   form.after(words);
+  form.addEventListener("focusout", (event) => {
+    if (form.contains(event.relatedTarget) || !words.textContent || words.querySelector("button")) return;
+    words.textContent = "";
+    restore();
+  });
+  return (request) => { words.textContent = ""; askedBy.set(request.do, words); ask(request); };
+}
+export function submit(id, act, restore) {
+  const form = at(id), asks = beside(form, restore);
+  form.noValidate = true; // the server says in a sentence what is missing
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    words.textContent = "";
     const request = act();
-    if (request) { askedBy.set(request.do, words); ask(request); }
+    if (request) asks(request);
   });
+}
+// Fields that show the values in force; what is typed stays until those change.
+export function inForce(fields) {
+  let known = "", restored = {};
+  const restore = () => { for (const [id, value] of Object.entries(restored)) at(id).value = value; };
+  listen("state", (state) => {
+    restored = Object.fromEntries(Object.entries(fields).map(([id, of]) => [id, of(state) ?? ""]));
+    const now = JSON.stringify(restored);
+    if (now !== known) { known = now; restore(); }
+  });
+  return restore;
 }
 listen("reply", (reply) => {
   const words = askedBy.get(reply.do);

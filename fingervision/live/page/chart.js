@@ -4,40 +4,63 @@ import { gaps } from "/page/gap_data.js";
 import { drawFailures } from "/page/chart_failures.js";
 import { values, wide } from "/page/axis_labels.js";
 
-const WINDOW_S = 30, DRAWN_EVERY_MS = 100, CALM_EVERY_MS = 1000, LEAST_WINDOW_S = 0.02, ZOOM = 1.6;
-export const view = { chart: null, zoomed: false, dirty: false, range: null, cursor: -1 };
+const WINDOW_S = 30, DRAWN_EVERY_MS = 100, CALM_EVERY_MS = 1000, LEAST_WINDOW_S = 0.02, ZOOM = 1.6, WHEEL = 0.0015;
+export const view = { chart: null, residual: null, zoomed: false, dirty: false, cursor: -1 };
 
-const cell = (digits) => (_, v) => (v === null || v === undefined ? "–" : v.toFixed(digits));
-function size() { return { width: Math.max(200, at("chart").clientWidth), height: Math.max(90, at("chart").clientHeight) }; }
-function make() {
+export function sizeOf(id) { return { width: Math.max(200, at(id).clientWidth), height: Math.max(70, at(id).clientHeight) }; }
+export function axisOf(label) {
+  const line = { stroke: colour("--line"), width: 1 }, upright = !label.startsWith("time");
+  return { stroke: colour("--ink"), grid: line, ticks: line, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 18, label, size: upright ? wide : 30, values };
+}
+// A line of the chart, or the unseen end of a band.
+export const seriesOf = (label, name = null, dash = undefined) => ({ label, stroke: name ? colour(name) : "transparent", width: 1.5, dash, points: { show: false } });
+export const bandOf = (name, series = [3, 2]) => ({ series, fill: `${colour(name)}44` });
+// What drags, clicks and the wheel do on each chart. A drag measures a range, and with Shift zooms into it.
+export function steer(chart) {
+  let zooms = false;
+  chart.over.addEventListener("mousedown", (event) => { zooms = event.shiftKey; }, true);
+  chart.over.addEventListener("dblclick", all);
+  chart.over.addEventListener("click", (event) => tell("picked", chart.posToVal(event.offsetX, "x")));
+  chart.over.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoom(Math.exp(event.deltaY * WHEEL * (event.deltaMode === 1 ? 16 : 1)), chart.posToVal(event.offsetX, "x"));
+  }, { passive: false });
+  chart.hooks.setSelect = [() => {
+    const { left, width } = chart.select;
+    if (width <= 2) return;
+    const [from, to] = [left, left + width].map((x) => chart.posToVal(x, "x"));
+    chart.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    if (zooms) zoomTo(from, to); else tell("dragged", from, to);
+  }];
+}
+export const cursor = { drag: { x: true, y: false, dist: 4, setScale: false }, sync: { key: "gap", setSeries: false, filters: { pub: (kind) => kind === "mousemove" || kind === "mouseleave", sub: () => true } } };
+const BARE_PX = 6; // with the residual below, its time axis is that of both
+export function make() {
+  const shown = view.chart && view.chart.scales.x, bare = document.body.classList.contains("modelled");
   if (view.chart) view.chart.destroy();
-  const ink = colour("--ink"), line = colour("--line"), accent = colour("--accent");
-  const axis = { stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 18 };
   view.chart = new uPlot({
-    ...size(),
+    ...sizeOf("chart"),
     legend: { show: false },
-    cursor: { drag: { x: true, y: false, dist: 4 } },
+    cursor,
     scales: { x: { time: false } },
-    axes: [{ ...axis, label: "time (s)", size: 30, values }, { ...axis, label: "gap (mm)", size: wide, values }],
-    series: [
-      { label: "time (s)", value: cell(3) },
-      { label: "gap (mm)", stroke: accent, width: 1.5, points: { show: false } },
-      { label: "− U", stroke: "transparent", points: { show: false } },
-      { label: "+ U", stroke: "transparent", points: { show: false } },
-      { label: "model (mm)", stroke: colour("--model"), width: 1.5, dash: [7, 4], points: { show: false } },
-    ],
-    bands: [{ series: [3, 2], fill: accent + "44" }],
+    axes: [bare ? { ...axisOf("time (s)"), label: null, size: BARE_PX, values: (chart, places) => places.map(() => "") } : axisOf("time (s)"), axisOf("gap (mm)")],
+    series: [seriesOf("time (s)"), seriesOf("gap (mm)", "--accent"), seriesOf("− U"), seriesOf("+ U"), seriesOf("model (mm)", "--model", [7, 4])],
+    bands: [bandOf("--accent")],
     hooks: {
-      setSelect: [(chart) => { if (chart.select.width > 2) view.zoomed = true; }],
       draw: [(chart) => drawFailures(chart), (chart) => tell("drawn", chart)],
+      setScale: [(chart, key) => { if (key === "x") tell("scaled", chart.scales.x.min, chart.scales.x.max); }],
       setCursor: [(chart) => { if (chart.cursor.left >= 0) tell("pointed", chart.posToVal(chart.cursor.left, "x")); }],
     },
   }, [[], [], [], [], []], at("chart"));
-  view.chart.over.addEventListener("dblclick", all);
-  view.chart.over.addEventListener("click", (event) => {
-    tell("picked", view.chart.posToVal(event.offsetX, "x"));
-  });
+  steer(view.chart);
+  if (view.zoomed && shown) view.chart.setScale("x", { min: shown.min, max: shown.max });
   view.dirty = true;
+}
+export function redraw() { for (const chart of [view.chart, view.residual]) if (chart) chart.redraw(false); }
+export function zoomTo(from, to) {
+  view.zoomed = true;
+  view.dirty = true;
+  view.chart.setScale("x", { min: from, max: to });
 }
 
 function follow() { view.zoomed = false; view.dirty = true; }
@@ -84,6 +107,7 @@ function draw() {
     view.chart.setData(shown, count < 2);
     if (count > 1) view.chart.setScale("x", { min, max });
   });
+  tell("charted", from, count > 1 ? { min, max } : null);
 }
 listen("changed", () => { view.dirty = true; });
 listen("paused", () => { view.dirty = true; });
@@ -95,7 +119,7 @@ on("zoom_in", "click", () => zoom(1 / ZOOM));
 on("zoom_out", "click", () => zoom(ZOOM));
 listen("start", () => {
   make();
-  new ResizeObserver(() => { if (view.chart) view.chart.setSize(size()); }).observe(at("chart"));
+  new ResizeObserver(() => { if (view.chart) view.chart.setSize(sizeOf("chart")); }).observe(at("chart"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", make);
   const again = () => { draw(); setTimeout(again, calm.matches ? CALM_EVERY_MS : DRAWN_EVERY_MS); };
   again();

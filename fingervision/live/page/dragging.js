@@ -1,5 +1,5 @@
 // Boxes in the picture, by mouse, finger or pen: whoever wants one asks for it, and gets it in the frame's own pixels.
-import { at, listen, page, tell } from "/page/bus.js";
+import { at, listen, page } from "/page/bus.js";
 
 const LEAST_PX = 8;
 let start = null, wanted = null;
@@ -49,8 +49,13 @@ listen("start", () => {
   canvas().addEventListener("pointerup", (event) => {
     if (!start) return;
     const end = inPicture(event), box = boxOf(start, end), { act, button } = wanted;
+    if (button !== "drag_height" && (box[2] < LEAST_PX || box[3] < LEAST_PX)) { // said where it is drawn, and drawn again
+      start = null;
+      showBox(shown.box || (page.state && page.state.region));
+      at("hint").textContent = `That was ${box[2]}×${box[3]} pixels: drag over at least ${LEAST_PX} each way, or leave it with Escape.`;
+      return;
+    }
     cancel();
-    if (button !== "drag_height" && (box[2] < LEAST_PX || box[3] < LEAST_PX)) { tell("message", `Drag over at least ${LEAST_PX} pixels each way.`, "refused"); return; }
     act(box, end);
   });
   canvas().addEventListener("pointercancel", cancel);

@@ -22,10 +22,12 @@ listen("now", (now) => {
     at("uncertainty").textContent = "\u00a0";
   } else {
     gap.textContent = (now.gap_mm - now.zero_mm).toFixed(4);
-    const what = now.has_budget ? "k = 2" : "k = 2, from frame to frame; the scale has no uncertainty";
+    const um = (u_mm) => `${(2000 * u_mm).toFixed(2)} µm`;
+    const what = !now.has_budget ? " (k = 2, from frame to frame; the scale has no uncertainty)"
+      : now.u_random_mm === null ? " (k = 2)" : `, of which from frame to frame ${um(now.u_random_mm)} (k = 2)`;
     at("zeroed").hidden = now.zero_mm === 0;
     at("zeroed").textContent = `less zero ${now.zero_mm.toFixed(4)} mm`;
-    at("uncertainty").textContent = now.u_mm === null ? "" : `± ${(2000 * now.u_mm).toFixed(2)} µm (${what})`;
+    at("uncertainty").textContent = now.u_mm === null ? "" : `± ${um(now.u_mm)}${what}`;
   }
   gap.dataset.frame = now ? String(now.frame) : "";
   say("frame_number", now ? String(now.frame) : "–");

@@ -4,6 +4,8 @@ import "/page/words.js";
 import "/page/figures.js";
 import "/page/chart.js";
 import "/page/readout.js";
+import "/page/residual_panel.js";
+import "/page/measured_range.js";
 import "/page/export_files.js";
 import "/page/dragging.js";
 import "/page/picture_view.js";

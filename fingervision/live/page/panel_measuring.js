@@ -1,5 +1,5 @@
 // Region, tips, height, tolerance and scale.
-import { ask, at, listen, number, on, page, panel, say, submit } from "/page/bus.js";
+import { ask, at, beside, inForce, listen, number, on, page, panel, say, submit } from "/page/bus.js";
 import { shown, wantBox } from "/page/dragging.js";
 
 panel("measuring", "Region and tips", `
@@ -36,6 +36,7 @@ panel("scaling", 'Scale: <span id="scale" class="quiet">not known</span>', `
     <button>Calibrate</button>
   </form>`, { open: true, order: 30 });
 
+const rounded = (value) => (value === null ? null : Number(value.toPrecision(7)));
 on("drag_region", "click", () => wantBox("drag_region", "Drag over the part of the picture to look at.", (box) => ask({ do: "region", box })));
 on("whole", "click", () => { shown.box = null; ask({ do: "region", box: null }); });
 on("drag_reference", "click", () => wantBox("drag_reference", "Drag over the reference, with some background around it.", (box) => {
@@ -44,10 +45,15 @@ on("drag_reference", "click", () => wantBox("drag_reference", "Drag over the ref
   at("size_mm").focus();
 }));
 on("tips", "change", () => ask({ do: "tips", tips: at("tips").value }));
-on("below_tip", "change", () => ask({ do: "height", below_tip_mm: number("below_tip") }));
-submit("region_form", () => ({ do: "region", box: ["region_x", "region_y", "region_w", "region_h"].map(number) }));
-submit("limits_form", () => ({ do: "limits", least: number("least"), greatest: number("greatest") }));
-submit("scale_form", () => ({ do: "scale", px_per_mm: number("px_per_mm"), u_px_per_mm: number("u_px_per_mm") }));
+const height = beside(at("below_tip").closest("div"), inForce({ below_tip: (state) => state.below_tip_mm }));
+on("below_tip", "change", () => height({ do: "height", below_tip_mm: number("below_tip") }));
+const SIDES = ["region_x", "region_y", "region_w", "region_h"];
+submit("region_form", () => ({ do: "region", box: SIDES.map(number) }),
+  inForce(Object.fromEntries(SIDES.map((id, i) => [id, (state) => (state.region || [0, 0, state.width_px, state.height_px])[i]]))));
+submit("limits_form", () => ({ do: "limits", least: number("least"), greatest: number("greatest") }),
+  inForce({ least: (state) => state.least_mm, greatest: (state) => state.greatest_mm }));
+submit("scale_form", () => ({ do: "scale", px_per_mm: number("px_per_mm"), u_px_per_mm: number("u_px_per_mm") }),
+  inForce({ px_per_mm: (state) => rounded(state.px_per_mm), u_px_per_mm: (state) => rounded(state.u_px_per_mm) }));
 submit("calibrate_form", () => {
   const box = shown.box || (page.state && [0, 0, page.state.width_px, page.state.height_px]);
   shown.box = null;
@@ -58,8 +64,4 @@ listen("state", (state) => {
   const u = state.u_px_per_mm === null ? " px/mm (no uncertainty)" : ` ± ${(2 * state.u_px_per_mm).toFixed(4)} px/mm (k = 2)`;
   say("scale", state.px_per_mm === null ? "not known" : `${state.px_per_mm.toFixed(4)}${u}`);
   if (document.activeElement !== at("tips")) at("tips").value = state.tips;
-  if (document.activeElement !== at("below_tip")) at("below_tip").value = state.below_tip_mm;
-  const whole = state.region || [0, 0, state.width_px, state.height_px];
-  if (!at("region_form").contains(document.activeElement))
-    ["region_x", "region_y", "region_w", "region_h"].forEach((id, i) => { at(id).value = whole[i]; });
 });

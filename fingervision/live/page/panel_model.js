@@ -1,14 +1,12 @@
-// The model beside the measurement: residual with its band, and what diagnose says of it so far.
-import { ask, at, colour, listen, number, on, page, panel, say, submit } from "/page/bus.js";
-import { gaps } from "/page/gap_data.js";
-import { values, wide } from "/page/axis_labels.js";
+// The model beside the measurement: size of the residual, and what diagnose says of it so far.
+import { ask, at, download, listen, number, on, page, panel, say, submit, withToken } from "/page/bus.js";
 
-const HIGH_PX = 140, WINDOW_S = 30, DRAWN_EVERY_MS = 250;
 panel("against", 'Model: <span id="model_residual" class="quiet"></span>', `
   <p id="verdict_words" role="status"></p>
   <ul id="verdict_effects"></ul>
-  <button id="next_run" hidden>Run what would settle it</button>
-  <div id="residual_chart" role="img" aria-label="Residual over time: measured less predicted, with its band"></div>
+  <details id="verdict_why" hidden><summary>Why</summary><img id="verdict_picture" alt="Measured less predicted gap before and after the named effects"></details>
+  <p id="verdict_next" hidden></p>
+  <div class="row"><button id="next_run" hidden>Run what would settle it</button><button id="verdict_report" hidden>Save the full report</button></div>
   <p id="model_words" class="quiet"></p>
   <form id="input_form" class="row">
     <label>input now <input id="typed_input" type="text" inputmode="decimal" autocomplete="off"> mm</label>
@@ -16,6 +14,18 @@ panel("against", 'Model: <span id="model_residual" class="quiet"></span>', `
   </form>`, { open: true, order: 6 });
 at("against").hidden = true;
 submit("input_form", () => ({ do: "input", input_mm: number("typed_input") }));
+on("verdict_report", "click", () => download(withToken("/verdict/report.html"), "report.html"));
+function picture() { // of the newest verdict, and only when it is looked at
+  const { verdict } = page.state.model, address = verdict && withToken(`/verdict/residuals.svg?rows=${verdict.rows}`);
+  if (verdict && at("verdict_why").open && at("verdict_picture").getAttribute("src") !== address) at("verdict_picture").src = address;
+}
+on("verdict_why", "toggle", picture);
+const NEXT = {
+  agrees: "Nothing has to be done; a smaller effect than those that the report lists would not be seen.",
+  named: "The full report has the effect's size and the model with it.",
+  ambiguous: "Another run would settle which of them it is.",
+  unknown: "No effect of the catalogue explains it: look at the frames where the model is worst (w), and at the set-up.",
+};
 on("next_run", "click", () => ask({ do: "bed_run", recipe: page.state.model.verdict.next_run }));
 
 const um = (value) => (value === null ? "–" : `${value.toFixed(1)} µm`);
@@ -28,6 +38,12 @@ listen("state", ({ model, bed, whole }) => {
   const { verdict } = model;
   const waits = model.busy ? "diagnose is at work…" : `A verdict needs 100 samples in motion, there and back: so far ${model.moved}.`;
   say("verdict_words", verdict ? `${verdict.verdict}: ${verdict.sentence} (${verdict.rows} samples)${model.busy ? " – being judged anew" : ""}` : waits);
+  at("verdict_why").hidden = at("verdict_next").hidden = at("verdict_report").hidden = !verdict;
+  if (verdict) {
+    const recipe = verdict.next_run && !(bed && bed.movable) ? ` Its recipe: ${verdict.next_run}` : "";
+    say("verdict_next", `What next: ${NEXT[verdict.verdict] || ""}${recipe}`);
+    picture();
+  }
   const effects = verdict ? verdict.effects.map(([name, values]) => `${name}: ${values}`) : [];
   if (at("verdict_effects").dataset.shown !== effects.join("\n")) {
     at("verdict_effects").dataset.shown = effects.join("\n");
@@ -41,37 +57,3 @@ listen("state", ({ model, bed, whole }) => {
   at("next_run").disabled = Boolean(bed && bed.doing);
   at("input_form").hidden = Boolean(bed) || whole;
 });
-
-let chart = null, drawnAt = 0;
-function make() {
-  if (chart) chart.destroy();
-  const ink = colour("--ink"), line = colour("--line"), shade = colour("--model");
-  const axis = { stroke: ink, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "11px system-ui, sans-serif" };
-  const hidden = { stroke: "transparent", points: { show: false } };
-  chart = new uPlot({
-    width: at("residual_chart").clientWidth || 300, height: HIGH_PX, legend: { show: false }, cursor: { show: false },
-    scales: { x: { time: false } },
-    axes: [{ ...axis, size: 30, values }, { ...axis, size: wide, values, label: "residual (µm)", labelSize: 16, labelFont: "11px system-ui, sans-serif" }],
-    series: [{}, { stroke: shade, width: 1.3, points: { show: false } }, hidden, hidden],
-    bands: [{ series: [3, 2], fill: `${shade}44` }],
-  }, [[], [], [], []], at("residual_chart"));
-}
-function draw() {
-  if (at("against").hidden || !at("against").open || page.paused || performance.now() - drawnAt < DRAWN_EVERY_MS) return;
-  drawnAt = performance.now();
-  if (!chart) make();
-  const wide = at("residual_chart").clientWidth;
-  if (wide && wide !== chart.width) chart.setSize({ width: wide, height: HIGH_PX });
-  const count = gaps.time.length, whole = page.state.whole;
-  let from = 0;
-  if (!whole && count) { from = gaps.time.findIndex((time) => time >= gaps.time[count - 1] - WINDOW_S); }
-  const rows = [[], [], [], []];
-  for (let i = from; i < count; i += 1) {
-    const known = gaps.gap[i] !== null && gaps.model[i] !== null, value = known ? 1000 * (gaps.gap[i] - gaps.model[i]) : null;
-    const half = known ? 1000 * (gaps.high[i] - gaps.gap[i]) : null;
-    rows[0].push(gaps.time[i]); rows[1].push(value); rows[2].push(known ? value - half : null); rows[3].push(known ? value + half : null);
-  }
-  chart.setData(rows);
-}
-listen("changed", draw);
-listen("start", () => matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (chart) make(); }));

@@ -2,7 +2,7 @@
 import { ask, at, listen, on, page, say, typed } from "/page/bus.js";
 import { key } from "/page/keys.js";
 import { gaps, nearest } from "/page/gap_data.js";
-import { view } from "/page/chart.js";
+import { redraw } from "/page/chart.js";
 import { marks } from "/page/time_ruler.js";
 
 const STEP_MANY = 25;
@@ -103,7 +103,7 @@ listen("state", (state) => {
   say("measure_range", now.measuring ? "Measuring…" : now.range ? "Measure range" : "Measure all");
   at("measure_range").disabled = now.measuring;
   const drawn = `${now.frame} ${now.range}`;
-  if (drawn !== last) { last = drawn; if (view.chart) view.chart.redraw(false); }
+  if (drawn !== last) { last = drawn; redraw(); }
 });
 
 // The frame that is shown, and the marked range, on the chart.
@@ -118,6 +118,7 @@ listen("drawn", (chart) => {
   ink.save();
   ink.strokeStyle = ink.fillStyle = style.getPropertyValue("--unsure").trim();
   ink.lineWidth = 2 * devicePixelRatio;
+  ink.setLineDash([]);
   if (x !== null) { ink.beginPath(); ink.moveTo(x, top); ink.lineTo(x, top + height); ink.stroke(); }
   if (now.range) {
     const [from, to] = now.range.map(place);

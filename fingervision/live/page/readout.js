@@ -30,6 +30,9 @@ export function move(samples) {
   const shown = view.cursor < 0 || view.cursor >= gaps.time.length ? gaps.time.length - 1 : view.cursor;
   let i = Math.min(gaps.time.length - 1, Math.max(0, shown + samples));
   while (i > 0 && i < gaps.time.length - 1 && gaps.frame[i] === null) i += Math.sign(samples);
+  goTo(i);
+}
+export function goTo(i) {
   view.zoomed = true;
   showTime(gaps.time[i]);
   view.chart.setCursor({ left: view.chart.valToPos(gaps.time[i], "x"), top: 10 }, false);

@@ -1,0 +1,53 @@
+// A range that is dragged over the chart is measured; it stays until another one, Escape, or its button.
+import { ask, at, colour, listen, on, page, say, tell } from "/page/bus.js";
+import { gaps } from "/page/gap_data.js";
+import { redraw, zoomTo } from "/page/chart.js";
+import { statistics } from "/page/range_statistics.js";
+
+let range = null;
+const digits = (U) => Math.min(6, Math.max(1, 1 - Math.floor(Math.log10(U || 1e-4)))); // two of the uncertainty
+const pm = (value, U) => (U > 0 ? `${value.toFixed(digits(U))} ± ${U.toFixed(digits(U))}` : value.toFixed(4));
+
+function words() {
+  const state = page.state, u_scale = state.u_px_per_mm === null ? null : state.u_px_per_mm / state.px_per_mm;
+  const found = statistics(gaps, ...range, u_scale);
+  if (!found) return "A range needs at least two frames with a gap.";
+  const parts = [
+    `${found.from.toFixed(3)} to ${found.to.toFixed(3)} s, frames ${found.first} to ${found.last}, n = ${found.n}`,
+    `mean ${pm(found.mean - state.zero_mm, found.U_mean)} mm`, `slope ${pm(found.slope, found.U_slope)} mm/s`,
+    `first to last ${pm(found.change, found.U_change)} mm`,
+    `${(found.least - state.zero_mm).toFixed(4)} to ${(found.greatest - state.zero_mm).toFixed(4)} mm`];
+  if (found.residual) parts.push(`residual mean ${(1e3 * found.residual.mean).toFixed(1)}, RMS ${(1e3 * found.residual.rms).toFixed(1)} µm`);
+  return `${parts.join(" · ")} (± at k = 2${u_scale === null ? ", from frame to frame only: the scale has no uncertainty" : ""})`;
+}
+function show() {
+  at("range_bar").hidden = !range;
+  if (range) say("range_words", words());
+  at("range_mark").hidden = !(page.state && page.state.playback);
+  redraw();
+}
+function clear() { if (range) { range = null; show(); } }
+listen("dragged", (from, to) => {
+  range = [from, to];
+  show();
+  at("announcer").textContent = at("range_words").textContent;
+});
+on("range_zoom", "click", () => zoomTo(...range));
+on("range_mark", "click", () => {
+  const found = statistics(gaps, ...range);
+  if (found) ask({ do: "range", first: found.first, last: found.last });
+  else tell("message", "A range needs at least two frames with a gap.", "refused");
+});
+on("range_clear", "click", clear);
+listen("escape", clear);
+listen("cleared", clear);
+listen("drawn", (chart) => {
+  if (!range) return;
+  const ink = chart.ctx, { top, height } = chart.bbox, [from, to] = range.map((time) => chart.valToPos(time, "x", true));
+  ink.save();
+  ink.beginPath(); ink.rect(chart.bbox.left, top, chart.bbox.width, height); ink.clip();
+  ink.fillStyle = colour("--accent");
+  ink.globalAlpha = 0.18;
+  ink.fillRect(from, top, to - from, height);
+  ink.restore();
+});

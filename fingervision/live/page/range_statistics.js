@@ -1,0 +1,26 @@
+// What a range of the chart says: mean and slope of the gap with their uncertainty (k = 2), its change, and the model's
+// residual. Noise from frame to frame averages out, the scale's share does not.
+const sum = (values) => values.reduce((total, value) => total + value, 0);
+const mean = (values) => sum(values) / values.length;
+
+// `columns` as in gap_data; `u_scale` is the scale's relative standard uncertainty, null where it is not known.
+export function statistics(columns, from, to, u_scale = null) {
+  const places = columns.time.flatMap((time, i) => (time >= from && time <= to && columns.gap[i] !== null ? [i] : []));
+  if (places.length < 2) return null;
+  const of = (name) => places.map((i) => columns[name][i]), time = of("time"), gap = of("gap");
+  const u = places.map((i) => (columns.high[i] - columns.gap[i]) / 2), random = places.map((i, k) => columns.random[i] ?? u[k]);
+  const n = places.length, time_0 = mean(time), gap_0 = mean(gap), spread = sum(time.map((t) => (t - time_0) ** 2));
+  const slope = sum(time.map((t, k) => (t - time_0) * (gap[k] - gap_0))) / spread;
+  const noise = mean(random.map((each) => each ** 2)), fixed = Math.max(0, mean(u.map((each) => each ** 2)) - noise);
+  const rest = n > 2 ? sum(time.map((t, k) => (gap[k] - gap_0 - slope * (t - time_0)) ** 2)) / (n - 2) : 0;
+  // Where the gap does not follow a line, what is left over widens the slope's uncertainty, as it does not follow one.
+  const U_slope = 2 * Math.hypot(Math.sqrt(Math.max(rest, noise) / spread), slope * (u_scale || 0));
+  const residual = places.flatMap((i) => (columns.model[i] === null ? [] : [columns.gap[i] - columns.model[i]]));
+  return {
+    n, from: time[0], to: time[n - 1], first: columns.frame[places[0]], last: columns.frame[places[n - 1]],
+    mean: gap_0, U_mean: 2 * Math.sqrt(noise / n + fixed), slope, U_slope,
+    change: gap[n - 1] - gap[0], U_change: 2 * Math.hypot(random[0], random[n - 1], (gap[n - 1] - gap[0]) * (u_scale || 0)),
+    least: gap.reduce((a, b) => Math.min(a, b)), greatest: gap.reduce((a, b) => Math.max(a, b)),
+    residual: residual.length ? { mean: mean(residual), rms: Math.sqrt(mean(residual.map((each) => each ** 2))) } : null,
+  };
+}

@@ -1,0 +1,60 @@
+// The residual under the gap, on the same time axis: measured less predicted, with its band; and where it is largest.
+import { ask, at, colour, listen, on, page, tell } from "/page/bus.js";
+import { gaps, residuals } from "/page/gap_data.js";
+import { axisOf, bandOf, cursor, make as makeChart, redraw, seriesOf, sizeOf, steer, view } from "/page/chart.js";
+import { key } from "/page/keys.js";
+import { goTo } from "/page/readout.js";
+
+function make() {
+  if (view.residual) view.residual.destroy();
+  const shade = "--model";
+  view.residual = new uPlot({
+    ...sizeOf("residual_chart"),
+    legend: { show: false },
+    cursor,
+    scales: { x: { time: false } },
+    axes: [axisOf("time (s)"), axisOf("residual (µm)")],
+    series: [{}, seriesOf("residual", shade), seriesOf("low"), seriesOf("high")],
+    bands: [bandOf(shade)],
+    hooks: { draw: [zeroLine, (chart) => tell("drawn", chart)] },
+  }, [[], [], [], []], at("residual_chart"));
+  steer(view.residual);
+}
+function zeroLine(chart) {
+  const y = chart.valToPos(0, "y", true), { left, top, width, height } = chart.bbox;
+  if (y < top || y > top + height) return;
+  chart.ctx.save();
+  chart.ctx.strokeStyle = colour("--quiet");
+  chart.ctx.setLineDash([4, 4]);
+  chart.ctx.beginPath(); chart.ctx.moveTo(left, y); chart.ctx.lineTo(left + width, y); chart.ctx.stroke();
+  chart.ctx.restore();
+}
+listen("state", ({ model }) => {
+  if (at("residual_chart").hidden === !model) return;
+  at("residual_chart").hidden = at("worst").hidden = !model;
+  document.body.classList.toggle("modelled", Boolean(model));
+  makeChart();
+  if (model && !view.residual) make();
+});
+listen("charted", (from, scale) => {
+  if (!view.residual || at("residual_chart").hidden) return;
+  view.residual.batch(() => { view.residual.setData(residuals(from), false); if (scale) view.residual.setScale("x", scale); });
+});
+listen("scaled", (min, max) => { if (view.residual) view.residual.setScale("x", { min, max }); });
+
+function worst() {
+  let place = -1, most = -1;
+  gaps.gap.forEach((gap, i) => {
+    const size = gap === null || gaps.model[i] === null ? -1 : Math.abs(gap - gaps.model[i]);
+    if (size > most) { most = size; place = i; }
+  });
+  if (place < 0) { tell("message", "No frame has a residual yet.", "worst"); return; }
+  goTo(place);
+  if (page.state.playback) ask({ do: "seek", frame: gaps.frame[place] });
+}
+on("worst", "click", worst);
+key(["w"], "the frame at which the model is worst", () => (at("worst").hidden ? false : worst()));
+listen("start", () => {
+  new ResizeObserver(() => { if (view.residual) { view.residual.setSize(sizeOf("residual_chart")); redraw(); } }).observe(at("residual_chart"));
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (view.residual) { make(); redraw(); } });
+});
