@@ -16,6 +16,7 @@ import pytest
 from calib.calibration import BareScale
 from fingervision.live.beside import Beside, stand_beside
 from fingervision.live.choices import Choices
+from fingervision.live.playback import track
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
 from fingervision.live.server import Page, bound
@@ -48,6 +49,12 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
             picture[:] = 128
         cv2.imwrite(str(folder / f"{number:03d}.png"), picture)
     return folder
+
+
+@pytest.fixture(autouse=True)
+def measured_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table is waited for: the program that measures gives way to nobody."""
+    monkeypatch.setattr(track, "WAITED_FOR", -20)
 
 
 @pytest.fixture

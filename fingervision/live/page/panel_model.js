@@ -16,7 +16,7 @@ at("against").hidden = true;
 submit("input_form", () => ({ do: "input", input_mm: number("typed_input") }));
 on("verdict_report", "click", () => download(withToken("/verdict/report.html"), "report.html"));
 function picture() { // of the newest verdict, and only when it is looked at
-  const { verdict } = page.state.model, address = verdict && withToken(`/verdict/residuals.svg?rows=${verdict.rows}`);
+  const verdict = page.state && page.state.model && page.state.model.verdict, address = verdict && withToken(`/verdict/residuals.svg?rows=${verdict.rows}`);
   if (verdict && at("verdict_why").open && at("verdict_picture").getAttribute("src") !== address) at("verdict_picture").src = address;
 }
 on("verdict_why", "toggle", picture);
