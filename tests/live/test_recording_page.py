@@ -80,11 +80,20 @@ def is_at(page: Any, number: int) -> None:
     shown(page, f"document.querySelector('#gap_mm').dataset.frame === '{number}'")
 
 
+ENDS = """line => [0, line.getTotalLength()].map(at => line.getPointAtLength(at).matrixTransform(line.getScreenCTM()))
+.map(point => [point.x, point.y])"""
+
+
+def measured_points(page: Any) -> list[tuple[float, float]]:
+    """Where the two measuring points are drawn in the window."""
+    return [(x, y) for x, y in page.locator("#overlay .distance").evaluate(ENDS)]
+
+
 def drawn_gap_px(page: Any) -> float:
     """Length of the drawn distance between the measuring points, in pixels of the picture, from where it is seen."""
-    line = page.locator("#overlay .distance").bounding_box()
+    (left, _), (right, _) = measured_points(page)
     picture = page.locator("#picture").bounding_box()
-    return float(line["width"] / picture["width"] * page.evaluate("document.querySelector('#picture').width"))
+    return float((right - left) / picture["width"] * page.evaluate("document.querySelector('#picture').width"))
 
 
 def test_picture_zooms_with_its_overlay_and_frames_are_found_by_number_time_and_mark(
@@ -111,15 +120,14 @@ def test_picture_zooms_with_its_overlay_and_frames_are_found_by_number_time_and_
     is_at(page, 0)
     for zoom in (1.0, 4.0):
         found_px = float(page.inner_text("#gap_mm")) * PX_PER_MM
-        assert drawn_gap_px(page) == pytest.approx(found_px, abs=0.1)
-        points = page.locator("#overlay .distance").bounding_box()
-        page.mouse.move(points["x"] + points["width"] / 2, points["y"])
-        before = points["x"] + points["width"] / 2
+        assert drawn_gap_px(page) == pytest.approx(found_px, abs=0.02)
+        (left, top), (right, _) = measured_points(page)
+        page.mouse.move((left + right) / 2, top)
         while zoom == 1.0 and float(page.inner_text("#zoom_words")[:-1]) < 4.0:
             page.mouse.wheel(0, -100)
         # What was under the pointer stays there.
-        after = page.locator("#overlay .distance").bounding_box()
-        assert after["x"] + after["width"] / 2 == pytest.approx(before, abs=1.0)
+        (after_left, _), (after_right, _) = measured_points(page)
+        assert (after_left + after_right) / 2 == pytest.approx((left + right) / 2, abs=1.0)
     line_px = page.locator("#overlay .distance").evaluate("line => getComputedStyle(line).vectorEffect")
     assert line_px == "non-scaling-stroke"
     page.locator("body").press("l")

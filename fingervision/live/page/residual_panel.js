@@ -1,10 +1,13 @@
 // The residual under the gap, on the same time axis: measured less predicted, with its band; and where it is largest.
 import { ask, at, colour, listen, on, page, tell } from "/page/bus.js";
+import { decimals } from "/page/axis_labels.js";
 import { gaps, residuals } from "/page/gap_data.js";
 import { axisOf, bandOf, cursor, make as makeChart, redraw, seriesOf, sizeOf, steer, view } from "/page/chart.js";
 import { key } from "/page/keys.js";
 import { goTo } from "/page/readout.js";
 
+// Without a label, which would take a third of the panel's height: the unit stands behind each time.
+const seconds = (chart, places, axis, room, step) => places.map((at) => `${at.toFixed(decimals(step))} s`);
 function make() {
   if (view.residual) view.residual.destroy();
   const shade = "--model";
@@ -13,7 +16,7 @@ function make() {
     legend: { show: false },
     cursor,
     scales: { x: { time: false } },
-    axes: [axisOf("time (s)"), axisOf("residual (µm)")],
+    axes: [{ ...axisOf("time (s)"), label: null, values: seconds }, axisOf("resid. (µm)")],
     series: [{}, seriesOf("residual", shade), seriesOf("low"), seriesOf("high")],
     bands: [bandOf(shade)],
     hooks: { draw: [zeroLine, (chart) => tell("drawn", chart)] },
