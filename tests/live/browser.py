@@ -63,7 +63,7 @@ def opened(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iter
         for page in context.pages:
             page.screenshot(path=folder / f"{request.node.name}_{number}.png", full_page=True)
         context.close()
-    assert errors == []
+    assert not errors, errors
     assert requests
     assert all(re.match(r"(http|ws|blob:http)://127\.0\.0\.1:\d+/", url) for url in requests), requests
 
