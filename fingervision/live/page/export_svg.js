@@ -1,5 +1,5 @@
 // The chart as it is seen, drawn as lines and letters: gap with its band and model, and the residual under it.
-import { colour, page } from "/page/bus.js";
+import { at, colour } from "/page/bus.js";
 import { decimals } from "/page/axis_labels.js";
 import { failures } from "/page/chart_failures.js";
 
@@ -53,5 +53,5 @@ export function svg(title, gap, residual, [from, to]) {
   for (const [at, words] of ticks(from, to)) parts.push(`<text x="${x(at).toFixed(2)}" y="${foot + 16}" text-anchor="middle">${words}</text>`);
   parts.push(`<text x="${(LEFT + WIDE - RIGHT) / 2}" y="${foot + 34}" text-anchor="middle">time (s)</text>`);
   const high = foot + FOOT;
-  return `<svg xmlns="http://www.w3.org/2000/svg" width="${WIDE}" height="${high}" viewBox="0 0 ${WIDE} ${high}" font-family="sans-serif" font-size="12" fill="${colour("--ink")}"><rect width="${WIDE}" height="${high}" fill="${colour("--card")}"/><text x="${LEFT}" y="20">${escaped(title)}</text>${parts.join("")}</svg>\n`;
+  return `<svg xmlns="${at("overlay").namespaceURI}" width="${WIDE}" height="${high}" viewBox="0 0 ${WIDE} ${high}" font-family="sans-serif" font-size="12" fill="${colour("--ink")}"><rect width="${WIDE}" height="${high}" fill="${colour("--card")}"/><text x="${LEFT}" y="20">${escaped(title)}</text>${parts.join("")}</svg>\n`;
 }
