@@ -89,7 +89,7 @@ def test_what_the_bed_may_not_do_is_refused_and_nothing_moves(session: Session, 
     outside = tmp_path.parent / "outside.toml"
     outside.write_text(RECIPE)
     for request in (
-        {"do": "bed_move", "to_mm": "0,5 mm", "speed_mm_s": 0.5},
+        {"do": "bed_move", "to_mm": "0,5 px", "speed_mm_s": 0.5},
         {"do": "bed_move", "to_mm": float("nan"), "speed_mm_s": 0.5},
         {"do": "bed_move", "speed_mm_s": 0.5},
         {"do": "bed_jog", "speed_mm_s": 0.5, "for_s": 11.0},
