@@ -19,9 +19,15 @@ from fingervision.storage.provenance import provenance
 from fingervision.storage.recipe_toml import read_recipe, write_recipe
 from fingervision.testbed.bed_factory import SIMULATED, open_bed
 from fingervision.testbed.run.recipe_run import run_recipe
-from fingervision.testbed.run.resume_state import contents, refuse_others
-from fingervision.testbed.run.run_folder import rows_before, times_of
-from fingervision.testbed.run.run_metadata import JOINED, SAMPLES, SIMULATION
+from fingervision.testbed.run.run_folder import (
+    JOINED,
+    SAMPLES,
+    SIMULATION,
+    contents,
+    refuse_others,
+    rows_before,
+    times_of,
+)
 from fingervision.testbed.simulation.injected_effects import Hidden
 from fingervision.testbed.simulation.parse_injected_effects import usual_values
 

@@ -12,7 +12,7 @@ from fingervision.live.session import Session
 from fingervision.motion.drive_at import drive_at
 from fingervision.storage.out_folder import make_out_folder
 from fingervision.tables.read import read_drive
-from fingervision.testbed.run.run_metadata import SIMULATION, write_expected
+from fingervision.testbed.run.run_folder import SIMULATION, write_expected
 
 
 @dataclass(frozen=True, slots=True)

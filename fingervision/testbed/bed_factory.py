@@ -5,7 +5,7 @@ from collections.abc import Collection
 from contextlib import suppress
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from calib.calibration import BareScale
 from fingervision.domain.errors import FingervisionError, UsageError
@@ -27,7 +27,7 @@ from fingervision.testbed.clocks.clock import Clock, HostClock, VirtualClock
 from fingervision.testbed.device_kinds import Kind, kind_of
 from fingervision.testbed.force_sensor import ForceSensor
 from fingervision.testbed.motion.soft_limits import SoftLimits
-from fingervision.testbed.operator import AtTheBed, operator_of
+from fingervision.testbed.operator import Operator, operator_of
 from fingervision.testbed.simulation.gripper import SimulatedGripper
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 from fingervision.testbed.simulation.recording_actuator import Followed
@@ -111,8 +111,8 @@ def _built(
         limits = limits_within(context.limits, actuator.limits, top.table("limits"))
         if model is not None:
             if context.motion is None:
-                actuator = followed = Followed(actuator)
-                context.motion = followed.motion
+                followed = Followed(actuator)
+                actuator, context.motion = cast("Actuator", followed), followed.motion
             context.gripper = SimulatedGripper(model, context.motion, context.hidden, context.play_mm, context.since_s)
         force: ForceSensor | None = None
         if "force_sensor" in parts:
@@ -136,7 +136,7 @@ def _built(
         clock=context.clock,
         actuator=actuator,
         limits=limits,
-        operator=operator_of(camera) if replays else AtTheBed(),
+        operator=operator_of(camera) if replays else Operator(),
         force_sensor=force,
         camera=camera,
         scale=context.scale,

@@ -1,7 +1,6 @@
 """The operator of a test bed: a person at the terminal, or an immediate action for a simulated camera."""
 
 from dataclasses import replace
-from typing import Protocol
 
 from fingervision.domain.errors import StateError
 from fingervision.testbed.camera import BedCamera
@@ -9,28 +8,8 @@ from fingervision.testbed.cameras.simulated import SHIFT_MM, SimulatedCamera
 from fingervision.testbed.terminal import TERMINAL
 
 
-class Operator(Protocol):
-    """Protocol of the operator: a person at a real test bed; a simulated test bed performs the steps at once."""
-
-    def turn_part(self) -> None:
-        """Turn the part by 180 degrees in the picture."""
-        ...
-
-    def shift_picture(self) -> None:
-        """Shift the camera or the part, so that the fingers appear elsewhere in the picture."""
-        ...
-
-    def put_in_slot(self, size_mm: float) -> None:
-        """Put a reference slot of known width in place of the gripper, in the plane of the fingers."""
-        ...
-
-    def take_out_slot(self) -> None:
-        """Put the gripper back in place of the slot."""
-        ...
-
-
-class AtTheBed:
-    """A person who receives requests on the terminal, and confirms when a step is done."""
+class Operator:
+    """The operator of a test bed: a person who receives requests on the terminal, and confirms when a step is done."""
 
     def turn_part(self) -> None:
         """Ask the person on the terminal to turn the part, and wait for the confirmation."""
@@ -56,7 +35,7 @@ class AtTheBed:
             )
 
 
-class AtTheSimulation:
+class AtTheSimulation(Operator):
     """Operator of a simulated test bed: the placement of the simulated part changes at once.
 
     Parameters
@@ -89,4 +68,4 @@ class AtTheSimulation:
 
 def operator_of(camera: BedCamera | None) -> Operator:
     """Choose the operator of a test bed according to its camera."""
-    return AtTheSimulation(camera) if isinstance(camera, SimulatedCamera) else AtTheBed()
+    return AtTheSimulation(camera) if isinstance(camera, SimulatedCamera) else Operator()

@@ -1,10 +1,12 @@
-"""Terminal input: responses to questions, and single letters typed at any time."""
+"""Terminal input: responses to questions, single letters typed at any time, and Ctrl-C."""
 
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
-from threading import Thread
+from types import FrameType
 from typing import TextIO
 
 from fingervision.domain.errors import StateError
@@ -29,7 +31,7 @@ class Terminal:
         self._keyboard, self._screen = keyboard, screen
         self._asked = False
         self._answers: SimpleQueue[str] = SimpleQueue()
-        self._reader: Thread | None = None
+        self._reader: threading.Thread | None = None
         self._unasked: Callable[[str], None] | None = None
         self._ended: Callable[[], bool] = lambda: False
 
@@ -77,7 +79,7 @@ class Terminal:
             return
         self._unasked, self._ended = unasked, ended
         if self._reader is None:
-            self._reader = Thread(target=self._read, args=(keyboard,), name="keys", daemon=True)
+            self._reader = threading.Thread(target=self._read, args=(keyboard,), name="keys", daemon=True)
             self._reader.start()
         try:
             yield
@@ -96,3 +98,19 @@ class Terminal:
 
 
 TERMINAL = Terminal()
+
+
+def in_main_thread() -> bool:
+    """Whether this is the main thread, which alone receives signals."""
+    return threading.current_thread() is threading.main_thread()
+
+
+@contextmanager
+def handled(note: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Within the `with` block, Ctrl-C and SIGTERM call a function, if this is the main thread."""
+    before = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)} if in_main_thread() else {}
+    try:
+        yield
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)

@@ -8,7 +8,7 @@ import pytest
 
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
-from fingervision.testbed.board.port import opened_port
+from fingervision.testbed.board.link import opened_port
 from fingervision.testbed.manual import manual_control
 from tests.testbed.board_bed import CONTRACT_STEPS, times_of, written_bed
 from tests.testbed.emulated_board import EmulatedBoard, MotorController, compiled, missing_tools, running

@@ -70,7 +70,7 @@ def test_what_a_hand_cannot_do_is_refused() -> None:
     actuator, screen = screw("0\n")
     with pytest.raises(LimitError, match=r"a jog at 2 mm/s"):
         actuator.jog(2.0)
-    with pytest.raises(LimitError, match=r"^Step 3 must be stored in a motor controller, but a hand screw has none"):
+    with pytest.raises(LimitError, match=r"^Step 3 must be stored in a motor controller, but the hand screw has none"):
         actuator.run_step(3)
     with pytest.raises(LimitError, match=r"^The target must lie between -1 and 6 mm, but is 7 mm: nothing was"):
         actuator.move(7.0, 1.0)

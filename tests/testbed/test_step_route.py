@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from fingervision.domain.errors import FingervisionError, LimitError
 from fingervision.domain.step_data import Coordinates, Operation, SpeedEntry, Step
-from fingervision.testbed.motion.step_route import SAME_MM, jog_step, nominal_speed_mm_s, route
+from fingervision.testbed.motion.step_checks import SAME_MM, jog_step, nominal_speed_mm_s, route
 
 TOP_MM_S = 400.0
 

@@ -3,6 +3,10 @@
 A kind of stage is a subclass that translates seven calls into its own protocol. What every stage must do (refuse a
 target beyond the limits, refuse a second motion, stop at any time, end a motion that never arrives, notice that it
 rests at another place than it was sent to) stands in this file, so that no kind can forget it.
+
+A device that can be told no speed is led along a ramp of positions. The ramp needs no thread: the position that is due
+is sent whenever the stage is looked at, which a test bed does at each frame and every 20 ms while it waits. If the
+program is killed, the stage therefore stands still.
 """
 
 import threading
@@ -14,7 +18,7 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Self, TypeVar
 
-from fingervision.domain.errors import DeviceError, FingervisionError, LimitError, StateError
+from fingervision.domain.errors import DeviceError, FingervisionError, StateError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, RefusedError, StageLimits
 from fingervision.testbed.clocks.clock import Clock
@@ -72,7 +76,7 @@ class _Motion:
     speed_mm_s: float = inf
 
 
-class SingleAxis(ABC):
+class SingleAxis(FreeMoves, ABC):
     """An actuator (`testbed.actuator`) without step data; the seven calls may raise any exception.
 
     Parameters
@@ -85,12 +89,11 @@ class SingleAxis(ABC):
         Limits and coordinate of the stage.
     """
 
-    has_steps = False
     # Whether the device knows its position; a device that can say so states it while it is asked whether it moves.
     _homed = True
 
     def __init__(self, name: str, clock: Clock, settings: AxisSettings) -> None:
-        self.name, self.limits = name, settings.limits
+        super().__init__(settings.limits, name)
         self._clock, self._settings = clock, settings
         self._line = threading.RLock()  # keeps each question together with its answer
         self._refusal: Alarm | None = None
@@ -127,16 +130,32 @@ class SingleAxis(ABC):
     def _release(self) -> None:
         """Close the connection."""
 
+    def _set_up(self) -> None:
+        """Say the first words to the device, and check what it answers."""
+        self._at_mm()
+
     def at_rest(self) -> Self:
-        """Return the stage after ending a motion that an earlier program, which was killed, has left behind."""
+        """Return the stage after its set-up, and after ending a motion that a killed program has left behind.
+
+        If that fails, the connection is closed.
+        """
+        try:
+            self._set_up()
+            self._come_to_rest()
+        except BaseException:
+            with suppress(Exception):
+                self._release()
+            raise
+        return self
+
+    def _come_to_rest(self) -> None:
+        until_s = self._clock.now_s() + PATIENCE_S + self.limits.settling_s
         if self.busy:
             self.stop()
-            until_s = self._clock.now_s() + PATIENCE_S + self.limits.settling_s
-            while self.busy:
-                if self._clock.now_s() > until_s:
-                    raise DeviceError(f"{self.name} must come to rest when it is opened, but still moves: stop it.")
-                self._clock.wait_until(self._clock.now_s() + LOOK_EVERY_S)
-        return self
+        while self.busy:
+            if self._clock.now_s() > until_s:
+                raise DeviceError(f"{self.name} must come to rest when it is opened, but still moves: stop it.")
+            self._clock.wait_until(self._clock.now_s() + LOOK_EVERY_S)
 
     # The protocol of an actuator.
 
@@ -213,10 +232,6 @@ class SingleAxis(ABC):
         began_s, self._still_mm, self._still_s = self._clock.now_s(), STILL_MM, STILL_S
         self._went(stops, _Motion(None, began_s, began_s + HOME_S))
 
-    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse motions beyond the limits of the stage."""
-        check_move(self.limits, to_mm, speed_mm_s)
-
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move to a position at a positive speed."""
         check_move(self.limits, to_mm, speed_mm_s)
@@ -242,10 +257,6 @@ class SingleAxis(ABC):
         if speed_mm_s != 0.0:
             # The device's own continuous motion would ignore the limits in the test bed's configuration.
             self.move(self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm, abs(speed_mm_s))
-
-    def run_step(self, number: int) -> None:
-        """Refuse: such a stage has no step data that a test bed could use."""
-        raise LimitError(f"Step {number} must be stored in the controller, but {self.name} has no step data: use move.")
 
     def stop(self) -> None:
         """Stop the motion at once, without waiting for a question that is being asked."""
@@ -338,3 +349,43 @@ def in_a_line(error: Exception) -> str:
 def without_hardware(section: Section, folder: Path) -> FreeMoves:
     """Limits of the stage, for checking a plan without opening the test bed."""
     return FreeMoves(stage_limits(section))
+
+
+class SetpointAxis(SingleAxis):
+    """A `SingleAxis` whose subclass states whether the device takes a speed, and how it is set to a position."""
+
+    # Begin, end, speed and time of the beginning of the ramp.
+    _ramp: tuple[float, float, float, float] | None = None
+
+    @abstractmethod
+    def _takes_speed(self, speed_mm_s: float) -> bool:
+        """Tell the device the speed of the next motion; return False if it cannot be told."""
+
+    @abstractmethod
+    def _put(self, to_mm: float) -> None:
+        """Begin to move to a position."""
+
+    @abstractmethod
+    def _settled(self) -> bool:
+        """Whether the device has reached the position to which it was set last."""
+
+    def _begin(self, to_mm: float, speed_mm_s: float) -> None:
+        if self._takes_speed(speed_mm_s):
+            self._put(to_mm)
+        else:
+            self._ramp = (self._position_mm(), to_mm, speed_mm_s, self._clock.now_s())
+
+    def _moving(self) -> bool:
+        ramp, stops = self._ramp, self._stops
+        if not self._settled():
+            return True
+        if ramp is None:
+            return False
+        from_mm, to_mm, speed_mm_s, began_s = ramp
+        left = 1.0 - speed_mm_s * (self._clock.now_s() - began_s) / max(abs(to_mm - from_mm), 1e-12)
+        self._put(to_mm - max(left, 0.0) * (to_mm - from_mm))
+        if left <= 0.0:
+            self._ramp = None
+        if self._stops != stops:  # a stop came while the position was being sent
+            self._halt()
+        return True

@@ -13,13 +13,12 @@ from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.board import controller_settings, wire
 from fingervision.testbed.board.board import KEY, Board, board_of
 from fingervision.testbed.board.controller_settings import Codes, Waits, codes_of, waits_of
+from fingervision.testbed.board.link import fingervision_at
 from fingervision.testbed.board.motions import Motions, Run
-from fingervision.testbed.board.port import fingervision_at
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.motion.move_limits import PUBLISHED, PUBLISHED_KEYS, check_move, check_speed, stage_limits
-from fingervision.testbed.motion.step_checks import planned
-from fingervision.testbed.motion.step_route import jog_step, route
+from fingervision.testbed.motion.step_checks import jog_step, planned, route
 from fingervision.testbed.reading import Reading
 
 SIMULATED = False

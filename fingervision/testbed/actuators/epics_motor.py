@@ -50,11 +50,6 @@ class MotorRecord(SingleAxis):
         Engineering units (EGU) in a millimetre.
     clock, settings
         As in `SingleAxis`.
-
-    Raises
-    ------
-    DeviceError
-        The record's own limits are narrower than those of the configuration.
     """
 
     def __init__(
@@ -64,8 +59,11 @@ class MotorRecord(SingleAxis):
         super().__init__(f"motor record {record}", clock, settings)
         self._context, self._fields, self._home, self._per_mm = context, fields, home, units_per_mm
         self._began_s = -BEGINS_S
+
+    def _set_up(self) -> None:
+        settings = self._settings
         low, high = (self._asked(lambda name=name: self._get(name)) for name in ("LLM", "HLM"))  # type: ignore[misc]
-        ends = [(settings.zero_mm + settings.sign * mm) * units_per_mm
+        ends = [(settings.zero_mm + settings.sign * mm) * self._per_mm
                 for mm in (settings.limits.lower_mm, settings.limits.upper_mm)]  # fmt: skip
         # Equal limits switch the record's check off.
         if low != high and not low - 1e-9 <= min(ends) <= max(ends) <= high + 1e-9:
@@ -120,11 +118,8 @@ def build(section: Section, context: BuildContext) -> MotorRecord:
         found = client.get_pvs(*(f"{record}.{field}" for field in FIELDS))
         for each in found:
             each.wait_for_connection(timeout=CONNECTS_S)
-        fields = dict(zip(FIELDS, found, strict=True))
-        return MotorRecord(client, fields, record, home, per_mm, context.clock, settings).at_rest()
-    except DeviceError:
-        client.disconnect()
-        raise
     except Exception as error:
         client.disconnect()
         section.refuse("record", f"must be a motor record in the network, but {record} is none ({in_a_line(error)}).")
+    fields = dict(zip(FIELDS, found, strict=True))
+    return MotorRecord(client, fields, record, home, per_mm, context.clock, settings).at_rest()

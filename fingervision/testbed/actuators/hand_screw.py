@@ -28,7 +28,7 @@ ASK_AT_MOST = 3
 AN_INSTANT_S = 1e-4
 
 
-class HandScrew:
+class HandScrew(FreeMoves):
     """Actuator whose positions are requested on the terminal; a motion lasts until its reading is typed.
 
     Parameters
@@ -41,13 +41,11 @@ class HandScrew:
         Terminal for questions and answers.
     """
 
-    name = "hand screw"
-    has_steps = False
     busy = False
     alarm: Alarm | None = None
 
     def __init__(self, limits: StageLimits, clock: Clock, terminal: Terminal) -> None:
-        self.limits = limits
+        super().__init__(limits, "hand screw")
         self._clock, self._terminal = clock, terminal
         self._at_mm = 0.0
         self._turned: list[Reading] = []
@@ -59,10 +57,6 @@ class HandScrew:
             0.0,
         )
 
-    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse motions beyond the limits of the screw."""
-        check_move(self.limits, to_mm, speed_mm_s)
-
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Ask the user to turn the screw; the speed is up to the user."""
         check_move(self.limits, to_mm, speed_mm_s)
@@ -72,13 +66,6 @@ class HandScrew:
         """Refuse: a hand-turned screw cannot be stopped by command."""
         raise LimitError(
             f"A hand screw can only be moved to positions, but a jog at {speed_mm_s:g} mm/s was requested: use move."
-        )
-
-    def run_step(self, number: int) -> None:
-        """Refuse: step data exist only in a motor controller."""
-        raise LimitError(
-            f"Step {number} must be stored in a motor controller, but a hand screw has none: write a step of kind "
-            '"move" in the recipe.'
         )
 
     def stop(self) -> None:

@@ -7,7 +7,6 @@ document, both compared message by message with thorlabs-apt-protocol, an indepe
 """
 
 import struct
-from contextlib import suppress
 from time import monotonic
 
 import serial
@@ -76,13 +75,14 @@ class KinesisStage(SingleAxis):
             (servo, servo * period_s) if period_s else (STEPPER_SPEED, STEPPER_ACCELERATION)
         )
         self._rest = b""
-        number = self._asked(lambda: SERIAL_NUMBER.unpack_from(self._ask(ASK_INFO, INFO))[0])
-        self.name = f"Thorlabs controller {number} at {port.port}, channel {channel}"
-        self._asked(lambda: self._send(ENABLE, channel, 1))
+        self._acceleration = acceleration_mm_s2 and round(acceleration_mm_s2 * counts_per_mm * acceleration_unit)
+
+    def _set_up(self) -> None:
+        (number,) = self._asked(lambda: SERIAL_NUMBER.unpack_from(self._ask(ASK_INFO, INFO)))
+        self.name = f"Thorlabs controller {number} at {self._port.port}, channel {self._channel}"
+        self._asked(lambda: self._send(ENABLE, self._channel, 1))
         held = self._asked(lambda: SPEEDS.unpack_from(self._ask(ASK_SPEED, SPEED)))
-        self._acceleration = (
-            held[2] if acceleration_mm_s2 is None else round(acceleration_mm_s2 * counts_per_mm * acceleration_unit)
-        )
+        self._acceleration = self._acceleration or held[2]
 
     def _moving(self) -> bool:
         bits = STATE.unpack_from(self._ask(ASK_STATUS, STATUS))[1]
@@ -152,9 +152,4 @@ def build(section: Section, context: BuildContext) -> KinesisStage:
     except Exception as error:  # pyserial raises exceptions of several classes
         section.refuse("port", f"must be that of a controller, but {name} could not be opened ({in_a_line(error)}).")
     unit = 0x20 + bay if bay else UNIT
-    try:
-        return KinesisStage(port, channel, unit, counts, period_s, ramp, context.clock, settings).at_rest()
-    except BaseException:
-        with suppress(Exception):
-            port.close()
-        raise
+    return KinesisStage(port, channel, unit, counts, period_s, ramp, context.clock, settings).at_rest()

@@ -10,9 +10,8 @@ from typing import Any
 from fingervision.storage.toml_section import Section
 from fingervision.testbed import micromanager_core
 from fingervision.testbed.actuator import RefusedError
-from fingervision.testbed.actuators._setpoint_axis import SetpointAxis
 from fingervision.testbed.actuators._single_axis import KEYS as AXIS
-from fingervision.testbed.actuators._single_axis import AxisSettings, stated_axis, without_hardware
+from fingervision.testbed.actuators._single_axis import AxisSettings, SetpointAxis, stated_axis, without_hardware
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.micromanager_core import Core, core_of
@@ -46,7 +45,6 @@ class MicroManagerStage(SetpointAxis):
     ) -> None:  # fmt: skip
         super().__init__(f"Micro-Manager stage {device}{axis}", clock, settings)
         self._shared, self._device, self._axis, self._speed, self._homes = shared, device, axis, speed, homes
-        self._at_mm()
 
     @property
     def _core(self) -> Any:

@@ -13,9 +13,14 @@ from typing import Any
 
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import RefusedError
-from fingervision.testbed.actuators._setpoint_axis import SetpointAxis
 from fingervision.testbed.actuators._single_axis import KEYS as AXIS
-from fingervision.testbed.actuators._single_axis import AxisSettings, in_a_line, stated_axis, without_hardware
+from fingervision.testbed.actuators._single_axis import (
+    AxisSettings,
+    SetpointAxis,
+    in_a_line,
+    stated_axis,
+    without_hardware,
+)
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 
@@ -87,7 +92,6 @@ class OphydStage(SetpointAxis):
         super().__init__(f"ophyd device {device.name or type(device).__name__}", clock, settings)
         self._device, self._call, self._speed, self._home, self._per_mm = device, call, speed, home, units_per_mm
         self._status: Any = None
-        self._at_mm()
 
     def _position_mm(self) -> float:
         device = self._device

@@ -52,7 +52,6 @@ class TextStage(SingleAxis):
         # Reply that ends a command which the controller answers only when it is done.
         self._awaited: re.Pattern[str] | None = None
         self._last_mm = 0.0
-        self._at_mm()
 
     def _moving(self) -> bool:
         if self._awaited is not None:
@@ -121,10 +120,6 @@ def build(section: Section, context: BuildContext) -> TextStage:
     """Open the port that the configuration states, and say the first words."""
     settings, words = stated_axis(section), words_of(section, context.folder, NEEDED)
     conversation = opened_line(section, words)
-    try:
-        identity = f" ({conversation.identity})" if conversation.identity else ""
-        name = f"{words.name}{identity} at {section.word('port')}"
-        return TextStage(conversation, words, name, context.clock, settings).at_rest()
-    except BaseException:
-        conversation.close(None)
-        raise
+    identity = f" ({conversation.identity})" if conversation.identity else ""
+    name = f"{words.name}{identity} at {section.word('port')}"
+    return TextStage(conversation, words, name, context.clock, settings).at_rest()

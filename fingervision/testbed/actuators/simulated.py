@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import DeviceError, LimitError, StateError
+from fingervision.domain.errors import DeviceError, StateError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
@@ -36,7 +36,7 @@ HOMING_MM_S = 1.0
 Array = NDArray[np.float64]
 
 
-class SimulatedActuator:
+class SimulatedActuator(FreeMoves):
     """The simulated stage, connected to a board with its own clock.
 
     Parameters
@@ -51,11 +51,8 @@ class SimulatedActuator:
         Generator for the board's clock and response times.
     """
 
-    name = "simulated actuator"
-    has_steps = False
-
     def __init__(self, clock: Clock, stage: SimulatedStage, limits: StageLimits, rng: np.random.Generator) -> None:
-        self.limits = limits
+        super().__init__(limits, "simulated actuator")
         self._clock, self._stage, self._step_mm, self._rng = clock, stage, limits.encoder_step_mm, rng
         self._board = OwnClock.drawn(rng)
         self._read_until_s = clock.now_s()
@@ -83,10 +80,6 @@ class SimulatedActuator:
         self._ready()
         self._stage.home(self._clock.now_s(), HOMING_MM_S)
 
-    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse motions beyond the limits of the simulated stage."""
-        check_move(self.limits, to_mm, speed_mm_s)
-
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move to a position at a positive speed."""
         check_move(self.limits, to_mm, speed_mm_s)
@@ -100,12 +93,6 @@ class SimulatedActuator:
         if speed_mm_s != 0.0:
             end_mm = self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm
             self._stage.go(self._clock.now_s(), end_mm, abs(speed_mm_s))
-
-    def run_step(self, number: int) -> None:
-        """Refuse: step data exist only in a motor controller."""
-        raise LimitError(
-            f"Step {number} must be stored in a motor controller, but the simulated actuator has none: use move."
-        )
 
     def stop(self) -> None:
         """Stop the motion at once."""

@@ -6,7 +6,6 @@ not on hardware.
 """
 
 import threading
-from contextlib import suppress
 from typing import Any
 
 from fingervision.storage.toml_section import Section
@@ -51,7 +50,6 @@ class StandaStage(SingleAxis):
         super().__init__(f"Standa controller {axis.get_serial_number()} at {name}", clock, settings)
         self._axis, self._acceleration, self._homes = axis, acceleration_mm_s2, homes
         self._device = threading.Lock()  # keeps the messages of two threads apart
-        self._at_mm()
 
     def _status(self) -> Any:
         with self._device:
@@ -104,9 +102,4 @@ def build(section: Section, context: BuildContext) -> StandaStage:
         axis.set_calb(step_mm, axis.get_engine_settings().MicrostepMode)
     except Exception as error:  # the library raises exceptions of several classes
         section.refuse("device", f"must be that of a controller, but {name} could not be opened ({in_a_line(error)}).")
-    try:
-        return StandaStage(axis, ramp, name, context.clock, settings, homes=homes).at_rest()
-    except BaseException:
-        with suppress(Exception):
-            axis.close_device()
-        raise
+    return StandaStage(axis, ramp, name, context.clock, settings, homes=homes).at_rest()

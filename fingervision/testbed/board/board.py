@@ -12,11 +12,10 @@ from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.storage.board_toml import read_board
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.board import wire
-from fingervision.testbed.board.link import ASK_EVERY_S, BoardLink, BoardRefusalError
-from fingervision.testbed.board.port import opened_port
+from fingervision.testbed.board.link import ASK_EVERY_S, BoardLink, BoardRefusalError, opened_port
 from fingervision.testbed.build_context import BuildContext
-from fingervision.testbed.clocks.board_clock import FEWEST, JoinedClock
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.clocks.synchronisation import FEWEST, JoinedClock
 
 # Opening the port may reset the board, which then starts its sketch within two seconds.
 STARTS_WITHIN_S = 1.0
@@ -50,6 +49,15 @@ class Board:
         Connection to the board.
     identity : wire.Identity
         Identity that the board reports.
+
+    Attributes
+    ----------
+    dropped_code : str
+        The board's code for the reason why the drive line was released.
+    driven_board_s : float or None
+        Time of the drive line's last rising edge since the last `run`, on the board's clock (s).
+    lost_samples : int
+        Number of force samples that did not arrive.
     """
 
     def __init__(self, settings: BoardSettings, link: BoardLink, identity: wire.Identity) -> None:
@@ -57,9 +65,9 @@ class Board:
         self.name = f"{identity.name} {identity.version} on {settings.port}"
         self.lost_samples = 0
         self._link = link
-        self._levels, self._cause = wire.Levels(0), wire.GOING
+        self._levels, self.dropped_code = wire.Levels(0), wire.GOING
         self._users = 0
-        self._driven_board_s: float | None = None
+        self.driven_board_s: float | None = None
         self._samples: deque[ForceSample] = deque(maxlen=MOST_SAMPLES)
         self._numbers = wire.Unwrapped(16)
         self._next_number: int | None = None
@@ -74,13 +82,8 @@ class Board:
     @property
     def dropped(self) -> str | None:
         """Reason in words why the drive line was released; None if the drive line was not released."""
-        words = DROPPED.get(self._cause)
+        words = DROPPED.get(self.dropped_code)
         return None if words is None else words.format(silence_ms=self.settings.silence_ms)
-
-    @property
-    def dropped_code(self) -> str:
-        """The board's code for the reason why the drive line was released."""
-        return self._cause
 
     @property
     def clock(self) -> JoinedClock:
@@ -94,20 +97,12 @@ class Board:
         """Number of lines received with a wrong checksum."""
         return self._link.damaged_lines
 
-    @property
-    def driven_board_s(self) -> float | None:
-        """Time of the drive line's last rising edge on the board's clock (s).
-
-        The time is None if the drive line had no rising edge since the last `run`.
-        """
-        return self._driven_board_s
-
     def run(self, code: int, at_most_s: float) -> None:
         """Set the select lines, wait until they have settled, and raise the drive line.
 
         The board releases the drive line after `at_most_s` at the latest.
         """
-        self._driven_board_s = None
+        self.driven_board_s = None
         self._do(f"R {code:X} {ceil(1e3 * at_most_s):X}")
 
     def release(self) -> None:
@@ -139,7 +134,7 @@ class Board:
     def clear(self) -> None:
         """Allow motions, initially and after a stop: release the hold line, raise the enable line."""
         self._do("K")
-        self._cause = wire.GOING
+        self.dropped_code = wire.GOING
         if Role.ENABLE in self.settings.lines:
             self._do("E 1")
 
@@ -176,12 +171,12 @@ class Board:
 
     def on_state(self, answer: wire.Answer) -> None:
         """Receive the board's state (called by the link)."""
-        self._levels, self._cause = answer.levels, answer.cause
+        self._levels, self.dropped_code = answer.levels, answer.cause
 
     def on_change(self, change: wire.Change, board_s: float) -> None:
         """Receive changed lines (called by the link)."""
         if change.levels & ~self._levels & wire.Levels.DRIVE:
-            self._driven_board_s = board_s
+            self.driven_board_s = board_s
         self._levels = change.levels
 
     def on_sample(self, sample: wire.Sample, board_s: float) -> None:

@@ -5,18 +5,96 @@ milliseconds: this shows the board that the computer works, shows the link that 
 clocks of board and computer.
 """
 
+import errno
+import os
 import random
 from contextlib import suppress
+from pathlib import Path
 from threading import Condition, Lock, Thread
 from typing import Protocol
 
 import serial
+from serial.tools.list_ports import comports
 
 from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.testbed.board import wire
-from fingervision.testbed.board.port import BAUD
-from fingervision.testbed.clocks.board_clock import ClockJoin, JoinedClock
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.clocks.synchronisation import ClockJoin, JoinedClock
+
+BAUD = 115200
+PROGRAM = "fingervision"
+# Description that pyserial gives for an unknown port.
+UNKNOWN = "n/a"
+# Longest wait for input in the link's thread, which must send messages regularly to keep the board awake.
+READ_TIMEOUT_S = 0.005
+WRITE_TIMEOUT_S = 1.0
+
+
+def found_ports() -> tuple[tuple[str, str], ...]:
+    """Names of this machine's serial ports, each with the device connected to it."""
+    return tuple(sorted((port.device, port.description) for port in comports()))
+
+
+def holders_of(name: str) -> tuple[int, ...]:
+    """Other processes of this user that have a port open; on systems other than Linux none are found."""
+    port = Path(name).resolve()
+    holders = []
+    for folder in Path("/proc").glob("[0-9]*/fd"):
+        process = int(folder.parent.name)
+        try:
+            if process != os.getpid() and any(file.readlink() == port for file in folder.iterdir()):
+                holders.append(process)
+        except OSError:  # the process has ended, or belongs to another user
+            continue
+    return tuple(sorted(holders))
+
+
+def fingervision_at(name: str) -> int | None:
+    """Number of another fingervision process that has a port open and can be asked to end; None if none has."""
+    for process in holders_of(name):
+        try:
+            words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if any(Path(os.fsdecode(word)).name in (PROGRAM, f"{PROGRAM}.exe") for word in words):
+            return process
+    return None
+
+
+def opened_port(name: str) -> serial.Serial:
+    """Open a serial port for exclusive use.
+
+    Raises
+    ------
+    DeviceError
+        There is no such port, another program has it, or this user may not open it.
+    """
+    try:
+        return serial.Serial(name, BAUD, timeout=READ_TIMEOUT_S, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
+    except ValueError as error:
+        raise DeviceError(f"The board's port must be a serial port, but is {name!r} ({error}).") from error
+    except serial.SerialException as error:
+        raise DeviceError(_why_closed(name, error)) from error
+
+
+def _why_closed(name: str, error: serial.SerialException) -> str:
+    # A lock of another program is reported as EAGAIN; Windows reports "access denied" without a number.
+    if error.errno in (errno.EAGAIN, errno.EBUSY) or "Could not exclusively lock" in str(error):
+        holders = ", ".join(f"process {process}" for process in holders_of(name))
+        who = f"another program ({holders})" if holders else "another program"
+        return f"The port {name} must be free, but {who} has it open: close that program first."
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return (
+            f"The port {name} must be open to this user, but access was denied: join the group that owns it (on Debian "
+            "`sudo adduser $USER dialout`, then log in again), or close the program that has it."
+        )
+    ports = found_ports()
+    there = ", ".join(port if words == UNKNOWN else f"{port} ({words})" for port, words in ports)
+    hint = f"; those of this machine are {there}" if ports else "; this machine has none: plug the board in"
+    if error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        return f"There is no serial port {name}{hint}."
+    return f"The port {name} could not be opened as a serial port ({error}){hint}."
+
 
 ASK_EVERY_S = 0.02
 # Interval at which a stop is repeated until it is confirmed. It must be longer than a question and its answer take (3.5
@@ -69,6 +147,13 @@ class BoardLink:
         The open port.
     clock : Clock
         Clock of the computer; it must run in real time (a virtual clock does not advance while the board works).
+
+    Attributes
+    ----------
+    joined : JoinedClock or None
+        Relation of the board's clock to the computer's; None in the first moments.
+    stopping : bool
+        Whether a stop was requested that the board has not yet confirmed.
     """
 
     def __init__(self, port: serial.Serial, clock: Clock) -> None:
@@ -77,7 +162,7 @@ class BoardLink:
         self._listener: Listener | None = None
         self._session: int | None = None
         self._failure: str | None = None
-        self._awake = self._stopping = False
+        self._awake = self.stopping = False
         self._closed = False
         self._news = Condition()
         self._one_command, self._writing = Lock(), Lock()
@@ -87,19 +172,9 @@ class BoardLink:
         self._last_asked_s = self._last_heard_s = self._last_fit_s = clock.now_s()
         self._time_us = wire.Unwrapped(32)
         self._join = ClockJoin()
-        self._joined: JoinedClock | None = None
+        self.joined: JoinedClock | None = None
         self._thread = Thread(target=self._read_on, name=f"board on {port.name}", daemon=True)
         self._thread.start()
-
-    @property
-    def joined(self) -> JoinedClock | None:
-        """Relation of the board's clock to the computer's; None in the first moments."""
-        return self._joined
-
-    @property
-    def stopping(self) -> bool:
-        """Whether a stop was requested that the board has not yet confirmed."""
-        return self._stopping
 
     def keep_awake(self, session: int, listener: Listener) -> None:
         """Start to request the state and to pass messages to a listener; fail if the board is lost or was reset."""
@@ -152,7 +227,7 @@ class BoardLink:
 
         `stop` only sets a flag, so that a signal handler may call it at any time.
         """
-        self._stopping = True
+        self.stopping = True
 
     def close(self) -> None:
         """Close the port; closing twice is allowed."""
@@ -235,7 +310,7 @@ class BoardLink:
                 )
                 return
             if message.cause != wire.GOING:
-                self._stopping = False
+                self.stopping = False
             if message.number in self._asked_s:
                 earliest_s = self._asked_s.pop(message.number)
                 board_s = self._time_us.of(message.time_us) / US_PER_S
@@ -253,11 +328,11 @@ class BoardLink:
                 "cable and its power supply, and start again."
             )
             return
-        if now_s - self._last_asked_s >= (STOP_EVERY_S if self._stopping else ASK_EVERY_S):
-            self._ask("Z" if self._stopping else "S")
-        if now_s - self._last_fit_s >= REFIT_EVERY_S or self._joined is None:
+        if now_s - self._last_asked_s >= (STOP_EVERY_S if self.stopping else ASK_EVERY_S):
+            self._ask("Z" if self.stopping else "S")
+        if now_s - self._last_fit_s >= REFIT_EVERY_S or self.joined is None:
             self._last_fit_s = now_s
-            self._joined = self._join.joined()
+            self.joined = self._join.joined()
 
     def _ask(self, words: str) -> None:
         self._question = (self._question + 1) % NUMBERS

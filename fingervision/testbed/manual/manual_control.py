@@ -1,7 +1,5 @@
 """Individual motions on request, monitored until they end and stopped at a limit."""
 
-import signal
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,6 +8,7 @@ from types import FrameType
 
 from fingervision.domain.errors import DeviceError, FingervisionError, LimitError, StateError
 from fingervision.testbed.bed import Bed
+from fingervision.testbed.terminal import handled
 
 LOOK_EVERY_S = 0.02
 # A jog made of stored steps is stopped this long before it would reach the test bed's limit.
@@ -49,20 +48,13 @@ def by_instruments(bed: Bed) -> Looking:
 @contextmanager
 def motor_stops_first(stop: Callable[[], None]) -> Iterator[None]:
     """Within the `with` block, Ctrl-C and SIGTERM stop the motor first; signals reach the main thread only."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
 
     def note(number: int, frame: FrameType | None) -> None:
         stop()
         raise Interrupted
 
-    before = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)}
-    try:
+    with handled(note):
         yield
-    finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
 
 
 def home(bed: Bed, looking: Looking | None = None) -> float:

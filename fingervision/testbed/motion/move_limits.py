@@ -1,6 +1,5 @@
 """Limits of a stage: what a configuration states of them, and what a motion must keep."""
 
-from dataclasses import dataclass
 from math import inf
 
 from fingervision.domain.errors import LimitError
@@ -40,22 +39,32 @@ def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
         )
 
 
-@dataclass(frozen=True, slots=True)
 class FreeMoves:
-    """A stage that can move to any position within its limits.
+    """A stage that can move to any position within its limits, and has no step data.
 
     Parameters
     ----------
     limits : StageLimits
         Limits of the stage.
+    name : str
+        Name of the stage in errors.
     """
 
-    limits: StageLimits
-    has_steps: bool = False
+    has_steps = False
+
+    def __init__(self, limits: StageLimits, name: str = "stage") -> None:
+        self.limits, self.name = limits, name
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
         """Refuse motions beyond the limits of the stage."""
         check_move(self.limits, to_mm, speed_mm_s)
+
+    def run_step(self, number: int) -> None:
+        """Refuse: such a stage has no step data that a test bed could use."""
+        raise LimitError(
+            f"Step {number} must be stored in a motor controller, but the {self.name} has none: use move, or a step of "
+            'kind "move" in the recipe.'
+        )
 
 
 LIMIT_KEYS = (

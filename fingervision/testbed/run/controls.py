@@ -1,12 +1,9 @@
 """Controls of a run (pause, continue, stop) by Ctrl-C, SIGTERM, or a letter on the terminal."""
 
-import signal
-import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import FrameType
+from contextlib import contextmanager, nullcontext
 
-from fingervision.testbed.terminal import TERMINAL
+from fingervision.testbed.terminal import TERMINAL, handled, in_main_thread
 
 PAUSE_LETTER, STOP_LETTER = "p", "q"
 
@@ -57,24 +54,11 @@ class Controls:
             Stops the motor at once, from a signal handler or another thread.
         """
         self._stop_motor = stop_motor
-        if threading.current_thread() is not threading.main_thread():
-            # Only the main thread receives signals; a recipe that runs in another thread is stopped by these controls.
-            try:
-                yield
-            finally:
-                self._stop_motor = lambda: None
-            return
-
-        def note(number: int, frame: FrameType | None) -> None:
-            self.stop()
-
-        before = {each: signal.signal(each, note) for each in (signal.SIGINT, signal.SIGTERM)}
+        keys = TERMINAL.listening(self._letter, lambda: self.stopped) if in_main_thread() else nullcontext()
         try:
-            with TERMINAL.listening(self._letter, lambda: self.stopped):
+            with handled(lambda number, frame: self.stop()), keys:
                 yield
         finally:
-            for each, handler in before.items():
-                signal.signal(each, handler)
             self._stop_motor = lambda: None
 
     def _letter(self, line: str) -> None:

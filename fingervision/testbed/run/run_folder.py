@@ -1,35 +1,192 @@
 """Folder of a run, written so that a run can be interrupted at any time and resumed."""
 
+import hashlib
+import json
 import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
+
+import numpy as np
 
 from calib.measured_scale import Calibration
+from fingervision import __version__
 from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import Frame
+from fingervision.domain.model import Model
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.calibration_json import write_calibration
+from fingervision.storage.durable import remove_empty
 from fingervision.storage.out_folder import FolderLock, make_out_folder
-from fingervision.storage.recorded_video import RecordedVideo
-from fingervision.storage.run_files import CALIBRATION, VIDEO, RunFiles
+from fingervision.storage.plain_file import json_of
+from fingervision.storage.recorded_video import RecordedVideo, frames_in
+from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, SCHEMA, VIDEO, RunFiles
 from fingervision.storage.samples_csv import SampleRow, SamplesCsv, read_samples, write_rows
+from fingervision.storage.simulation_table import write_simulation
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
-from fingervision.testbed.run.resume_state import remains
-from fingervision.testbed.run.run_metadata import (
-    JOINED,
-    RECIPE,
-    SAMPLES,
-    SIMULATION,
-    about_run,
-    digest_of,
-    write_expected,
-)
+from fingervision.testbed.motion.soft_limits import SoftLimits
 from fingervision.testbed.simulation.injected_effects import Hidden
+
+SAMPLES, SIMULATION, RECIPE, JOINED = "samples.csv", "simulation.csv", "recipe.toml", "joined.csv"
+KIND = "bed run"
+# Number of rows of simulation.csv, and its margin beyond the test bed's limits: readings in encoder steps may lie
+# beyond them.
+SIMULATED_ROWS, BEYOND_LIMITS_MM = 201, 0.06
+
+
+def digest_of(bed: Bed, hidden: Hidden) -> str:
+    """Hash that identifies a test bed and its injected effects without revealing them."""
+    effects = {name: dict(sorted(values.items())) for name, values in sorted(hidden.effects.items())}
+    return hashlib.sha256(json.dumps([bed.about, effects], sort_keys=True, default=str).encode()).hexdigest()
+
+
+def write_expected(path: Path, model: Model, limits: SoftLimits) -> None:
+    """Write the gap that the model predicts within the test bed's limits."""
+    low_mm, high_mm = limits.lower_mm - BEYOND_LIMITS_MM, limits.upper_mm + BEYOND_LIMITS_MM
+    inputs = np.linspace(low_mm, high_mm, SIMULATED_ROWS)
+    # The force is left out, because it depends on the object between the fingers, not only on the gripper.
+    write_simulation(path, inputs, replace(model.respond(inputs), force_n=None))
+
+
+def about_run(recipe: Recipe[Section], bed: Bed, hidden: Hidden, began_at: datetime) -> dict[str, Any]:
+    """Content of run.json at the start of a run."""
+    camera = None if bed.camera is None else bed.camera.description
+    return {
+        "schema": SCHEMA,
+        "kind": KIND,
+        "software": {"name": "fingervision", "version": __version__},
+        "name": recipe.name,
+        "began_at": began_at.isoformat(timespec="milliseconds"),
+        "recipe": recipe.text,
+        "bed": dict(bed.about),
+        "bed_digest": digest_of(bed, hidden),
+        "device": None
+        if camera is None
+        else {
+            "source": camera.name,
+            "kind": camera.kind,
+            "width_px": camera.width_px,
+            "height_px": camera.height_px,
+            "rate_hz": camera.rate_hz,
+            "notes": list(camera.notes),
+        },
+        "settings": {"below_tip_mm": bed.below_tip_mm, "tips": "auto", "roi": None},
+        "scale": {
+            "px_per_mm": None if bed.scale is None else bed.scale.px_per_mm,
+            "calibration": CALIBRATION if isinstance(bed.scale, Calibration) else None,
+        },
+        "model": None if bed.model is None else SIMULATION,
+        "video": VIDEO,
+        "samples": SAMPLES,
+        "events": EVENTS,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Remains:
+    """An interrupted run: its rows and events so far, from which it may be continued.
+
+    Parameters
+    ----------
+    began_at : datetime
+        Time at which the run began.
+    rows : list of SampleRow
+        Rows of the frames that have a row and a picture.
+    events : list of dict
+        Events of the run itself, in order.
+    """
+
+    began_at: datetime
+    rows: list[SampleRow]
+    events: list[dict[str, Any]]
+
+
+def contents(path: Path) -> list[str]:
+    """Names of the files in a folder, sorted; hidden files are ignored."""
+    return sorted(item.name for item in path.iterdir() if not item.name.startswith("."))
+
+
+def refuse_others(path: Path, held: str) -> NoReturn:
+    """Refuse a folder that contains other files, among which the run's files would be hard to find."""
+    raise OutputError(f"--out must be a new or empty folder, but {path} contains {held}: name another folder.")
+
+
+def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
+    """Find the interrupted run of this recipe on this test bed; None if there is nothing to continue.
+
+    Empty files are removed. The table is truncated to the rows whose pictures are in the video, and the file of events
+    to complete lines.
+
+    Raises
+    ------
+    DataError, OutputError
+        The folder contains other files, a finished run, or a run of another recipe or test bed.
+    """
+    remove_empty(path, (RUN, RECIPE, CALIBRATION, SIMULATION, VIDEO, SAMPLES, EVENTS))
+    held = contents(path)
+    if not held:
+        return None
+    if RUN not in held:
+        refuse_others(path, held[0])
+    about = _about(path)
+    if about.get("complete"):
+        raise OutputError(
+            f"The run in {path} is finished already: name another folder with --out, or remove this folder."
+        )
+    if not read_samples(path / SAMPLES):
+        # No frame was recorded: the run starts again, and no data are lost.
+        (path / EVENTS).unlink(missing_ok=True)
+        return None
+    if about.get("recipe") != recipe.text:
+        raise OutputError(
+            f"The run in {path} was interrupted, and used another recipe ({about.get('name')}): continue "
+            "with that recipe, or name another folder with --out."
+        )
+    if about.get("bed_digest") != digest:
+        raise OutputError(
+            f"The run in {path} was interrupted, and used another test bed: continue with that test bed, or "
+            "name another folder with --out."
+        )
+    rows = _rows_with_pictures(path)
+    return Remains(datetime.fromisoformat(str(about["began_at"])), rows, _numbered_events(path))
+
+
+def _about(path: Path) -> dict[str, Any]:
+    try:
+        about: dict[str, Any] = json_of(path / RUN)
+        kind = about.get("kind")
+    except (OSError, ValueError, AttributeError) as error:
+        raise OutputError(f"{path / RUN} could not be read ({error}): name another folder with --out.") from error
+    if kind != KIND:
+        refuse_others(path, "another run")
+    return about
+
+
+def _rows_with_pictures(path: Path) -> list[SampleRow]:
+    rows = read_samples(path / SAMPLES)
+    frames = frames_in(path / VIDEO)
+    if frames < len(rows):
+        rows = rows[:frames]
+        write_rows(path / SAMPLES, rows)
+    return rows
+
+
+def _numbered_events(path: Path) -> list[dict[str, Any]]:
+    try:
+        text = (path / EVENTS).read_bytes()
+    except FileNotFoundError:
+        return []
+    whole = text[: text.rfind(b"\n") + 1]
+    if len(whole) < len(text):
+        with (path / EVENTS).open("rb+") as file:
+            file.truncate(len(whole))
+    events = [json.loads(line) for line in whole.decode("utf-8").splitlines()]
+    return [event for event in events if "n" in event]
+
 
 # Largest size of a picture with noise in FFV1, in bytes per pixel.
 BYTES_PER_PX = 0.8

@@ -1,7 +1,7 @@
 """Stage position and force at the time of each camera frame."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,8 +15,7 @@ from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.actuator import Actuator
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.camera import BedCamera, Shot
-from fingervision.testbed.clocks.board_clock import ClockJoin
-from fingervision.testbed.clocks.camera_clock import ArrivalClock
+from fingervision.testbed.clocks.synchronisation import ArrivalClock, ClockJoin
 from fingervision.testbed.force_sensor import ForceSensor
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.text_protocol.sensor import TextSensor
@@ -73,42 +72,53 @@ class Position(JoinedInstrument):
         return self._track.at_mm(self.device_at(bed_s), at_once=at_once)
 
 
+class History:
+    """The newest readings of a quantity, between which it is interpolated linearly."""
+
+    def __init__(self) -> None:
+        self._at_s: deque[float] = deque(maxlen=READINGS_KEPT)
+        self._value: deque[float] = deque(maxlen=READINGS_KEPT)
+
+    def add(self, readings: Iterable[Reading]) -> None:
+        """Store readings; those that are no newer than the last one are left out."""
+        for reading in readings:
+            if not self._at_s or reading.device_s > self._at_s[-1]:
+                self._at_s.append(reading.device_s)
+                self._value.append(reading.value)
+
+    def at(self, device_s: float) -> float | None:
+        """Value at a time of the instrument's clock, held after the newest reading; None before the first reading."""
+        return float(np.interp(device_s, self._at_s, self._value)) if self._at_s else None
+
+
 class Force(JoinedInstrument):
     """Force at the drive over time."""
 
     def __init__(self, sensor: ForceSensor) -> None:
         super().__init__(sensor)
-        self._device_s: deque[float] = deque(maxlen=READINGS_KEPT)
-        self._force_n: deque[float] = deque(maxlen=READINGS_KEPT)
+        self._history = History()
 
     def read(self) -> tuple[Reading, ...]:
         """Return the readings since the last call, and store them."""
         readings = super().read()
-        for reading in readings:
-            if not self._device_s or reading.device_s > self._device_s[-1]:
-                self._device_s.append(reading.device_s)
-                self._force_n.append(reading.value)
+        self._history.add(readings)
         return readings
 
-    def at(self, bed_s: float) -> float:
+    def at(self, bed_s: float) -> float | None:
         """Force at a time of the test bed, interpolated linearly between readings (N)."""
-        return float(np.interp(self.device_at(bed_s), self._device_s, self._force_n))
+        return self._history.at(self.device_at(bed_s))
 
 
 class Channel:
     """A further quantity over time, whose times are those of the test bed."""
 
     def __init__(self, source: TextSensor) -> None:
-        self._source = source
-        self._at_s: deque[float] = deque(maxlen=READINGS_KEPT)
-        self._value: deque[float] = deque(maxlen=READINGS_KEPT)
+        self._source, self._history = source, History()
 
     def at(self, bed_s: float) -> float | None:
         """Value at a time, linear between readings and held after the newest; None before the first reading."""
-        for reading in self._source.samples():
-            self._at_s.append(reading.device_s)
-            self._value.append(reading.value)
-        return float(np.interp(bed_s, self._at_s, self._value)) if self._at_s else None
+        self._history.add(self._source.samples())
+        return self._history.at(bed_s)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,9 +1,11 @@
 """A real actuator whose readings drive a simulated gripper (hardware in the loop)."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.testbed.actuator import Actuator, Alarm, StageLimits
+from fingervision.testbed.actuator import Actuator
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.simulation.gripper import Motion
 
@@ -26,30 +28,9 @@ class Followed:
         self._homed_s: list[float] = []
         self._homing = False
 
-    @property
-    def name(self) -> str:
-        """Name of the actuator."""
-        return self._actuator.name
-
-    @property
-    def limits(self) -> StageLimits:
-        """Limits of the actuator."""
-        return self._actuator.limits
-
-    @property
-    def busy(self) -> bool:
-        """Whether the actuator moves."""
-        return self._actuator.busy
-
-    @property
-    def alarm(self) -> Alarm | None:
-        """Reason why the actuator refuses to move."""
-        return self._actuator.alarm
-
-    @property
-    def has_steps(self) -> bool:
-        """Whether `run_step` is possible."""
-        return self._actuator.has_steps
+    def __getattr__(self, name: str) -> Any:
+        """Every other member is that of the actuator."""
+        return getattr(self._actuator, name)
 
     @property
     def motion(self) -> Motion:
@@ -62,30 +43,6 @@ class Followed:
         """Go to the reference."""
         self._actuator.home()
         self._homing = True
-
-    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse a motion that the actuator cannot make."""
-        self._actuator.check(from_mm, to_mm, speed_mm_s)
-
-    def move(self, to_mm: float, speed_mm_s: float) -> None:
-        """Begin to move to a position at a positive speed."""
-        self._actuator.move(to_mm, speed_mm_s)
-
-    def jog(self, speed_mm_s: float) -> None:
-        """Begin to move until stopped."""
-        self._actuator.jog(speed_mm_s)
-
-    def run_step(self, number: int) -> None:
-        """Begin the motion of a step data block."""
-        self._actuator.run_step(number)
-
-    def stop(self) -> None:
-        """Stop the motion at once."""
-        self._actuator.stop()
-
-    def close(self) -> None:
-        """Stop and release the hardware."""
-        self._actuator.close()
 
     def readings(self) -> tuple[Reading, ...]:
         """Positions since the last call, which are also stored."""

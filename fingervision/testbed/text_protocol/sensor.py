@@ -8,6 +8,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import RefusedError
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.motion.move_limits import ENDLESS_N
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.text_protocol import line
 from fingervision.testbed.text_protocol.line import Line, opened_line
@@ -41,7 +42,7 @@ class TextSensor:
     def __init__(
         self, conversation: Line, words: Words, name: str, scale: float, zero: float, patience_s: float, clock: Clock
     ) -> None:
-        self.name = name
+        self.name, self.full_scale_n = name, ENDLESS_N
         self._talk, self._asks, self._clock = conversation, words.actions["value"], clock
         self._scale, self._zero, self._patience_s = scale, zero, patience_s
         self._new: deque[Reading] = deque(maxlen=MOST)
@@ -69,8 +70,8 @@ class TextSensor:
                 raise DeviceError(f"{self.name} must send values while the test bed works, but {why}: check its cable.")
         return samples
 
-    def waited(self) -> tuple[Reading, ...]:
-        """Values since the last call, at least one."""
+    def readings(self) -> tuple[Reading, ...]:
+        """Values since the last call, at least one: a force that is monitored must be new."""
         return self.samples(self._patience_s) or self.samples()
 
     def close(self) -> None:

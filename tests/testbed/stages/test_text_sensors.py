@@ -96,7 +96,7 @@ def test_channels_become_columns_and_a_slow_one_does_not_slow_the_frames(
         for name, words, device, scale in both
     )
     bed = bed_of(channels)
-    assert [len(channel.waited()) > 0 for channel in bed.channels.values()] == [True, True]
+    assert [len(channel.readings()) > 0 for channel in bed.channels.values()] == [True, True]
     slow.takes_s = 0.4
     recipe = tmp_path / "recipe.toml"
     recipe.write_text(RECIPE, encoding="utf-8")
