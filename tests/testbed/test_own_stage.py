@@ -24,40 +24,45 @@ def called(folder: Path, *words: str) -> Result:
     return CliRunner().invoke(cli, ["bed", words[0], *found, *words[1:]], catch_exceptions=False)
 
 
-@pytest.fixture(params=["keeps its speed", "teleports"])
-def bench(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, bool]:
-    """The stage of the tutorial with its test bed, and a stage that reaches its target at once."""
+@pytest.fixture(params=["", "too_fast", "too_slow"])
+def bench(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str]:
+    """The stage of the tutorial with its test bed, one that is there at once, and one of a quarter of its speed."""
     stage, bed = (
         re.search(rf"```\w+\n(# {name}\n.*?)```", TUTORIAL, re.DOTALL)[1]  # type: ignore[index]
         for name in ("my_stage.py", "bench.toml")
     )
     assert KEEPS_SPEED in stage
-    teleports = request.param == "teleports"
-    if teleports:
+    if request.param == "too_slow":
+        stage = stage.replace(
+            "self._speed_mm_s, self._began_s = speed_mm_s", "self._speed_mm_s, self._began_s = 0.25 * speed_mm_s"
+        )
+    if request.param == "too_fast":
         stage = stage.replace(KEEPS_SPEED, "done_mm = abs(way_mm)")
         stage = stage.replace("self._began_s + way_mm / self._speed_mm_s", "self._began_s")
     (tmp_path / "my_stage.py").write_text(stage, encoding="utf-8")
     (tmp_path / "bench.toml").write_text(bed, encoding="utf-8")
     (tmp_path / "recipe.toml").write_text(RECIPE, encoding="utf-8")
-    return tmp_path, teleports
+    return tmp_path, request.param
 
 
-def test_the_line_that_bed_check_prints_tests_the_contract(bench: tuple[Path, bool]) -> None:
-    folder, teleports = bench
+@pytest.mark.parametrize("bench", ["", "too_fast"], indirect=True)
+def test_the_line_that_bed_check_prints_tests_the_contract(bench: tuple[Path, str]) -> None:
+    folder, fault = bench
     (line,) = re.findall(r"python -c .*", called(folder, "check").output)
     *_, program = shlex.split(line)
     printed = StringIO()
     with redirect_stdout(printed):
         exec(program, {})
-    assert ("keeps the contract" in printed.getvalue()) is not teleports
-    assert ("test_a_motion_takes_the_time_that_its_speed_says" in printed.getvalue()) is teleports
+    assert ("keeps the contract" in printed.getvalue()) is not bool(fault)
+    assert ("test_a_motion_takes_the_time_that_its_speed_says" in printed.getvalue()) is bool(fault)
 
 
-def test_a_run_tells_of_a_stage_that_does_not_keep_its_speed(bench: tuple[Path, bool]) -> None:
-    folder, teleports = bench
+def test_a_run_tells_of_a_stage_that_does_not_keep_its_speed(bench: tuple[Path, str]) -> None:
+    folder, fault = bench
     done = called(folder, "run", "--out", str(folder / "run"))
-    assert ("warning: the recorded motions took" in done.output) is teleports
-    assert ("too_fast" in (folder / "run" / "events.jsonl").read_text(encoding="utf-8")) is teleports
+    assert ("warning: the recorded motions took" in done.output) is bool(fault)
+    events = (folder / "run" / "events.jsonl").read_text(encoding="utf-8")
+    assert [each for each in ("too_fast", "too_slow") if each in events] == ([fault] if fault else [])
 
 
 def test_a_bed_of_built_in_parts_needs_no_contract(tmp_path: Path) -> None:

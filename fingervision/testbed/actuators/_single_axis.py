@@ -101,8 +101,8 @@ class SingleAxis(FreeMoves, ABC):
         self._motion: _Motion | None = None
         self._stops = 0
         self._closed = self._seen = False
-        # The position that the stage held last, since when, and by how much and how long it must be held.
-        self._held_mm, self._since_s, self._still_mm, self._still_s = inf, -inf, STILL_MM, STILL_S
+        # The last position, that which the stage held before, since when, and by how much and how long it must be held.
+        self._now_mm, self._held_mm, self._since_s, self._still_mm, self._still_s = inf, inf, -inf, STILL_MM, STILL_S
 
     # Seven calls of a driver; positions are those of the device (mm).
 
@@ -185,7 +185,7 @@ class SingleAxis(FreeMoves, ABC):
         """
         if self._stands_still():
             return True
-        return self._seen and motion.to_mm is not None and abs(self._held_mm - motion.to_mm) <= self._near_mm + LOST_MM
+        return self._seen and motion.to_mm is not None and abs(self._now_mm - motion.to_mm) <= self._near_mm + LOST_MM
 
     def _stands_still(self) -> bool:
         """Query the position, and state whether it is held for some time."""
@@ -211,7 +211,8 @@ class SingleAxis(FreeMoves, ABC):
             self._fault = Alarm("lost", f"{words}; home the stage")
         elif way_mm > 4.0 * self._still_mm and TOO_FAST * took_s * motion.speed_mm_s < way_mm:
             words = f"it was told {motion.speed_mm_s:g} mm/s, but went {way_mm:.3g} mm within {took_s:.2g} s"
-            self._fault = Alarm("fast", f"{words}: its units of position or speed are not those that were stated")
+            why = "it does not keep its speed, states its target as its position, or has other units than stated"
+            self._fault = Alarm("fast", f"{words}: {why}")
         return False
 
     @property
@@ -300,7 +301,7 @@ class SingleAxis(FreeMoves, ABC):
         # An encoder shows no motion between two of its steps.
         self._still_s = max(STILL_S, 2.0 * self.limits.encoder_step_mm / speed_mm_s)
         self._do(lambda: self._begin(settings.zero_mm + settings.sign * to_mm, speed_mm_s))
-        until_s = self._clock.now_s() + PATIENCE * seconds + PATIENCE_S
+        until_s = self._clock.now_s() + PATIENCE * seconds + PATIENCE_S + self._still_s
         self._went(stops, _Motion(to_mm, began_s, until_s, at_mm, speed_mm_s))
 
     def _went(self, stops: int, motion: _Motion) -> None:
@@ -313,7 +314,7 @@ class SingleAxis(FreeMoves, ABC):
         position_mm = self._asked(self._position_mm)
         if not isfinite(position_mm):
             raise DeviceError(f"{self.name} must answer with its position, but answered {position_mm}.")
-        at_mm = (position_mm - self._settings.zero_mm) * self._settings.sign
+        self._now_mm = at_mm = (position_mm - self._settings.zero_mm) * self._settings.sign
         if abs(at_mm - self._held_mm) > self._still_mm:
             self._held_mm, self._since_s = at_mm, self._clock.now_s()
         return at_mm

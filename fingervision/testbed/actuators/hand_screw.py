@@ -122,7 +122,7 @@ def _number(words: str, otherwise: float) -> float | None:
 
 def _limits(section: Section) -> StageLimits:
     given = {"speed_mm_s": SPEED_MM_S, "accuracy_mm": ACCURACY_MM, **section.values}
-    return replace(stage_limits(replace(section, values=given)), force_n=inf)
+    return replace(stage_limits(replace(section, values=given)), force_n=inf, settling_s=inf)
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:

@@ -32,8 +32,9 @@ FIRST_FRAMES = 75
 # A recorded run begins at rest.
 REST_FRAMES = 5
 # A stage that takes less than this share of the expected time is faster than commanded, because ramps only make a
-# motion longer.
-LEAST_SHARE = 0.5
+# motion longer. It is slower if the expected time is less than this share of what it takes, but for its settling time
+# and RAMP_S for each motion.
+LEAST_SHARE, RAMP_S = 0.5, 0.5
 
 Progress = Callable[[float, float], None]
 
@@ -118,7 +119,7 @@ class Runner:
         watch.find_fingers()
         first = self._first_leg()
         total_s, done_s = sum(self.plan.seconds), sum(self.plan.seconds[:first])
-        foreseen_s = moved_s = 0.0
+        foreseen_s = moved_s = ramps_s = 0.0
         record.event("began", f"The plan has {len(self.plan.legs)} motion segments.")
         self._rest(first)
         for number, (leg, seconds) in enumerate(zip(self.plan.legs, self.plan.seconds, strict=True)):
@@ -127,29 +128,33 @@ class Runner:
             watch.leg = leg
             words = f"Step {leg.step}: {leg.words}."
             record.event("leg", words, leg=number, step=leg.step, frame=record.counts.recorded)
-            began_s, from_mm = watch.bed.clock.now_s(), watch.sight.position.newest
+            began_s, from_mm = watch.bed.clock.now_s() - watch.paused_s, watch.sight.position.newest
             self._do(leg, number)
             if isinstance(leg.act, Go) and leg.act.frames is None:
-                moved_s += watch.bed.clock.now_s() - began_s
+                moved_s += watch.bed.clock.now_s() - watch.paused_s - began_s
+                ramps_s += watch.bed.actuator.limits.settling_s + RAMP_S
                 foreseen_s += abs(leg.act.to_mm - from_mm) / leg.act.speed_mm_s
             done_s += seconds
             self.on_progress(done_s, total_s)
         record.write(at_once=True)
         if moved_s < LEAST_SHARE * foreseen_s:
-            self._warn_of_speed(moved_s, foreseen_s)
+            self._warn_of_speed(
+                "too_fast", moved_s, foreseen_s, "does not keep the commanded speed, so that frames are missing"
+            )
+        elif LEAST_SHARE * (moved_s - ramps_s) > foreseen_s:
+            self._warn_of_speed("too_slow", moved_s, foreseen_s, "or its controller keeps to a lower speed")
         record.event(
             "clocks", "The instruments' clocks were compared with the test bed's clock.", **watch.sight.clocks()
         )
         record.event("ended", f"{record.counts.recorded} frames were recorded.")
 
-    def _warn_of_speed(self, moved_s: float, foreseen_s: float) -> None:
+    def _warn_of_speed(self, event: str, moved_s: float, foreseen_s: float, why: str) -> None:
         words = (
             f"warning: the recorded motions took {moved_s:.3g} s, but should take {foreseen_s:.3g} s at the speeds of "
-            "the recipe: the stage does not keep the commanded speed, so that frames are missing. Run its contract "
-            "tests; `fingervision bed check` prints their command line."
+            f"the recipe: the stage {why}. Run its contract tests; `fingervision bed check` prints their command line."
         )
         self.watch.say(words)
-        self.watch.record.event("too_fast", words)
+        self.watch.record.event(event, words)
 
     def _first_leg(self) -> int:
         """Index of the first segment to execute: 0 with replay; without it, the segment that was interrupted."""

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import sleep
 from typing import Any
 
 from tests.testbed.stages import emulators
@@ -73,9 +74,8 @@ class Statuses(Library):
         emulators.Emulator.plugged.add(self)
 
     def settle(self) -> None:
-        for thread in threading.enumerate():
-            if "_run_callbacks" in thread.name or thread.name.startswith("timeout for"):
-                thread.join(1.0)
+        while any("sleep_and_finish" in each.name or "_run_callbacks" in each.name for each in threading.enumerate()):
+            sleep(1e-4)
 
     def close(self) -> None:
         emulators.Emulator.plugged.discard(self)
