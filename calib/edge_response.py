@@ -10,6 +10,11 @@ decides, and the quality of the fit does not.
 The blur is a Gaussian convolved with a disc (defocus) and integrated over the pixel, of which a share is spread further
 by an exponential to either side: the tails of optics, and coma if they are unlike. The side of a tail is fixed in the
 picture, while that of a tone curve is fixed to the dark side of each edge.
+
+A codec by blocks quantises the coefficients of a cosine transform of the levels. The error of a coefficient far larger
+than its quantiser's step differs from block to block and averages out, but smaller ones vanish in every block: the
+codec filters the levels, symmetrically, and a profile that is odd in light looks more nearly odd in the levels. What
+remains of each frequency is therefore unknown, as the optics are.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,6 +23,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.special import erfcx, ndtr
 
 from calib.camera_response import CURVES, CameraResponse, standard_response
@@ -47,6 +53,8 @@ MOST_STEPS, CONVERGED, STEP = 25, 0.02, 1e-4
 # Numbers of unknowns: common to all edges (see `FamilyFit`), and of each edge (position, both plateaus as
 # levels, slopes of both, ln of its own sigma over the common one).
 SHARED, OWN = 5, 6
+# Side of a codec's block (pixels), number of places of an edge in it, and smallest standard deviation of a lost share.
+BLOCK_PX, PLACES, LEAST_LOST = 8, 32, 1e-3
 
 # Gauss-Chebyshev quadrature of the second kind, whose weight is the line spread of a uniform disc: places (radii) and
 # weights. Seven nodes are exact to 1e-4 of the contrast up to a radius of three sigmas.
@@ -118,8 +126,8 @@ class FamilyFit:
     shared, u_shared : ndarray of float, shape (SHARED,)
         ln sigma, ln radius of the disc over sigma, shares of the tails towards larger and towards smaller coordinates,
         ln length of the tails over sigma; and their standard uncertainties.
-    edges : ndarray of float, shape (SHARED + edges * OWN,)
-        All unknowns but the parameters of the tone curve.
+    edges : ndarray of float, shape (SHARED + edges * OWN + bands,)
+        All unknowns but the parameters of the tone curve; the last are the shares of each frequency that a codec lost.
     log_evidence : float
         Logarithm of the evidence, up to a constant.
     misfit : ndarray of float, shape (edges,)
@@ -154,7 +162,11 @@ class FamilyFit:
 
 
 def fit_families(
-    profiles: Sequence[EdgeProfile], model_error: float, scale: float = 1.0, tagged: str = ""
+    profiles: Sequence[EdgeProfile],
+    model_error: float,
+    scale: float = 1.0,
+    tagged: str = "",
+    steps: Sequence[float] = (),
 ) -> list[FamilyFit]:
     """Fit every family to profiles, the most probable one first.
 
@@ -168,8 +180,10 @@ def fit_families(
         Factor of all uncertainties.
     tagged : str
         Standard response that a tag of the file states, which becomes a further family; empty without one.
+    steps : sequence of float
+        Steps of a codec's quantiser for the eight frequencies across an edge (shares of full scale); empty without one.
     """
-    data = _Data.of(profiles, model_error, scale)
+    data = _Data.of(profiles, model_error, scale, steps)
     fits: list[FamilyFit] = []
     for family in (*FAMILIES, *_tagged(tagged)):
         # A family with parameters begins where the best one has ended, because edges and optics are the same.
@@ -266,9 +280,11 @@ class _Data:
     side: Floats
     ends: Floats
     sigma: float
+    bands: Floats
+    u_lost: Floats
 
     @classmethod
-    def of(cls, profiles: Sequence[EdgeProfile], model_error: float, scale: float) -> "_Data":
+    def of(cls, profiles: Sequence[EdgeProfile], model_error: float, scale: float, steps: Sequence[float]) -> "_Data":
         sigma = float(np.median([_width(profile) for profile in profiles]))
         reach = REACH_SIGMAS * sigma + REACH_EXTRA_PX
         away, level, u, edge = [], [], [], []
@@ -286,12 +302,61 @@ class _Data:
             np.array([profile.side for profile in profiles]),
             np.array([profile.ends for profile in profiles]),
             sigma,
+            _bands(away, len(steps)),
+            _u_lost(sigma, float(np.median([profile.contrast for profile in profiles])), np.array(steps)),
         )
 
     def start(self) -> Floats:
         own = np.zeros((len(self.ends), OWN))
         own[:, 1:3] = self.ends
-        return np.concatenate([[np.log(self.sigma / START_WIDENED), np.log(START_DISC), 0.0, 0.0, 0.0], own.ravel()])
+        optics = [np.log(self.sigma / START_WIDENED), np.log(START_DISC), 0.0, 0.0, 0.0]
+        return np.concatenate([optics, own.ravel(), np.zeros(len(self.bands))])
+
+
+def _cosines() -> Floats:
+    """Orthonormal basis of the discrete cosine transform of a block's pixels, one frequency a row."""
+    at = np.arange(BLOCK_PX)
+    basis = np.sqrt(2.0 / BLOCK_PX) * np.cos(np.pi / BLOCK_PX * np.outer(at, at + 0.5))
+    basis[0] /= np.sqrt(2.0)
+    return np.asarray(basis)
+
+
+def _moved(x: Floats, way_px: float) -> Floats:
+    """Matrix that takes values at the increasing distances x to values at x + `way_px`, by linear interpolation."""
+    at = np.clip(x + way_px, x[0], x[-1])
+    before = np.clip(np.searchsorted(x, at) - 1, 0, x.size - 2)
+    share, rows = (at - x[before]) / (x[before + 1] - x[before]), np.arange(x.size)
+    matrix = np.zeros((x.size, x.size))
+    matrix[rows, before], matrix[rows, before + 1] = 1.0 - share, share
+    return matrix
+
+
+def _bands(away: Sequence[Floats], count: int) -> Floats:
+    """Matrices that take levels to their part of each frequency but the mean, averaged over all places of blocks.
+
+    The mean over all places of the projection on a vector of a basis is the convolution with its autocorrelation,
+    divided by the number of places.
+    """
+    if not count:
+        return np.zeros((0, 0, 0))
+    kernels = np.array([np.correlate(basis, basis, "full") for basis in _cosines()[1:]]) / BLOCK_PX
+    ways = range(1 - BLOCK_PX, BLOCK_PX)
+    edges = [np.tensordot(kernels, np.array([_moved(x, way) for way in ways]), 1) for x in away]
+    return np.array([block_diag(*(edge[k] for edge in edges)) for k in range(len(kernels))])
+
+
+def _u_lost(sigma: float, contrast: float, steps: Floats) -> Floats:
+    """Prior standard deviations of the lost share of each frequency but the mean.
+
+    A coefficient below half of a step vanishes, and the error of one above it is no fixed share of it.
+    """
+    if not steps.size:
+        return np.zeros(0)
+    places = np.arange(BLOCK_PX) - np.linspace(0.0, BLOCK_PX, PLACES, endpoint=False)[:, None]
+    # The same profile in each of a block's rows makes its coefficients larger by the square root of their number.
+    coefficients = np.sqrt(BLOCK_PX) * contrast * ndtr(places / sigma) @ _cosines().T
+    size = np.sqrt(np.mean(coefficients**2, axis=0))
+    return np.asarray(np.maximum(1.0 / (1.0 + (2.0 * size / steps) ** 2), LEAST_LOST)[1:])
 
 
 def _width(profile: EdgeProfile) -> float:
@@ -347,9 +412,10 @@ def _fit(family: Family, data: _Data, start: Floats) -> FamilyFit:
 def _priors(family: Family, data: _Data) -> tuple[Floats, Floats]:
     """Means and standard deviations of all unknowns; infinite for the position and the plateaus."""
     own = np.array([np.inf, np.inf, np.inf, U_SLOPE, U_SLOPE, U_UNLIKE])
+    edges, bands = len(data.ends), len(data.bands)
     shared_u = np.array([U_SIGMA, U_DISC, U_TAIL, U_TAIL, U_LENGTH])
-    mean = np.concatenate([family.mean, [np.log(data.sigma), 0.0, 0.0, 0.0, 0.0], np.zeros(OWN * len(data.ends))])
-    return mean, np.concatenate([family.u, shared_u, np.tile(own, len(data.ends))])
+    mean = np.concatenate([family.mean, [np.log(data.sigma), 0.0, 0.0, 0.0, 0.0], np.zeros(OWN * edges + bands)])
+    return mean, np.concatenate([family.u, shared_u, np.tile(own, edges), data.u_lost])
 
 
 def _cost(residual: Floats, unknowns: Floats, mean: Floats, precision: Floats) -> float:
@@ -359,23 +425,27 @@ def _cost(residual: Floats, unknowns: Floats, mean: Floats, precision: Floats) -
 def _jacobian(family: Family, data: _Data, unknowns: Floats, residual: Floats) -> Floats:
     """Derivatives of the residuals; an unknown of one edge moves that edge alone, so that all edges move at once."""
     common, edges = len(family.mean) + SHARED, len(data.ends)
-    moved = np.repeat(unknowns[None], common + OWN, axis=0)
+    own_end = common + OWN * edges
+    moved = np.repeat(unknowns[None], common + OWN + len(data.bands), axis=0)
     moved[np.arange(common), np.arange(common)] += STEP
     for j in range(OWN):
-        moved[common + j, common + j :: OWN] += STEP
+        moved[common + j, common + j : own_end : OWN] += STEP
+    lost = np.arange(len(data.bands))
+    moved[common + OWN + lost, own_end + lost] += STEP
     change = (_residuals(family, data, moved) - residual) / STEP
     jacobian = np.zeros((residual.size, unknowns.size))
-    jacobian[:, :common] = change[:common].T
+    jacobian[:, :common], jacobian[:, own_end:] = change[:common].T, change[common + OWN :].T
     for e in range(edges):
         mine = data.edge == e
-        jacobian[mine, common + OWN * e : common + OWN * (e + 1)] = change[common:, mine].T
+        jacobian[mine, common + OWN * e : common + OWN * (e + 1)] = change[common : common + OWN, mine].T
     return jacobian
 
 
 def _residuals(family: Family, data: _Data, sets: Floats) -> Floats:
     """Measured minus modelled level of every bin, in its standard uncertainties, for each set of unknowns."""
     k, edges = len(family.mean), len(data.ends)
-    own = sets[:, k + SHARED :].reshape(len(sets), edges, OWN)
+    own_end = k + SHARED + OWN * edges
+    own = sets[:, k + SHARED : own_end].reshape(len(sets), edges, OWN)
     at, dark, light, slope_dark, slope_light, unlike = (own[:, :, j][:, data.edge] for j in range(OWN))
     # The blurred step depends on few unknowns, which most sets of a derivative have in common.
     blur = np.concatenate((sets[:, k : k + SHARED], own[:, :, 0], own[:, :, 5]), axis=1)
@@ -390,7 +460,10 @@ def _residuals(family: Family, data: _Data, sets: Floats) -> Floats:
             table, before = _table(family, one[:k]), one[:k]
         ends = np.interp(np.stack([dark[i], light[i]]), LEVELS, table)
         out[i] = np.interp(ends[0] + (ends[1] - ends[0]) * share[i], table, LEVELS)
-    return np.asarray((out - data.level) / data.u)
+    kept = out
+    for share, band in zip(sets[:, own_end:].T, data.bands, strict=True):
+        kept = kept - share[:, None] * (out @ band.T)
+    return np.asarray((kept - data.level) / data.u)
 
 
 def _step(x: Floats, wider: Floats, shared: Floats, side: Floats) -> Floats:

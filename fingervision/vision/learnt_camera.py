@@ -7,7 +7,7 @@ import numpy as np
 
 from calib.camera_response import CURVES, standard_response
 from calib.edge_profile import EdgeProfile
-from calib.edge_response import FamilyFit, ResponsePosterior, fit_families
+from calib.edge_response import LINEAR_PRIOR, FamilyFit, ResponsePosterior, fit_families
 from fingervision.domain.camera import (
     CameraModel,
     CameraQuantity,
@@ -21,6 +21,9 @@ from fingervision.vision.flank_profiles import Seen, flank_profiles
 
 # Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
 MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.01}
+# Steps of the quantiser for the eight frequencies across an edge, as shares of full scale: the luminance table of JPEG
+# (ITU-T T.81, annex K.1, first row) at quality 75, the default of most programs, which halves it.
+STEPS = {Coding.INTRAFRAME: tuple(0.5 * step / 255.0 for step in (16, 11, 10, 16, 24, 40, 51, 61))}
 # Ratio of the residuals to their uncertainty above which no family explains the edges.
 MOST_MISFIT = 1.3
 # Overshoot of an edge (share of its contrast) above which the camera sharpens: sharpening after the tone curve makes
@@ -44,7 +47,8 @@ SHARPENED = (
     "tone curve: nothing is corrected, and u_shift_px contains a usual tone curve. Switch sharpening off, or "
     f"{REMEDY}."
 )
-# A third of the sRGB recordings through H.264 were called linear (tests/benchmarks/unknown_cameras.py).
+# A third of the sRGB recordings through H.264 were called linear (tests/benchmarks/unknown_cameras.py), and two of five
+# linear ones curved (CRF 28), also with the detail that the quantiser removes as an unknown.
 HIDDEN = (
     "The camera's response was not learnt, because a codec that predicts pictures from others (H.264) smooths edges in "
     f"a way that hides a tone curve: u_shift_px contains another usual response. Record losslessly, or {REMEDY}."
@@ -87,7 +91,7 @@ def learnt_from_profiles(profiles: list[EdgeProfile], prior: CameraModel, coding
     if overshoot > MOST_OVERSHOOT:
         return _not_learnt(prior, SHARPENED.format(share=overshoot), 1.0)
     assumed = prior.response.curve
-    fits, misfit = _fitted(profiles, MODEL_ERROR[coding], assumed.name if assumed.name in CURVES else "")
+    fits, misfit = _fitted(profiles, coding, assumed.name if assumed.name in CURVES else "")
     if misfit > MOST_MISFIT:
         return _not_learnt(prior, MISFIT.format(misfit=misfit), 1.0)
     best = fits[0]
@@ -102,7 +106,8 @@ def learnt_from_profiles(profiles: list[EdgeProfile], prior: CameraModel, coding
     if prior.response.is_known:
         return camera
     if coding is Coding.INTERFRAME:
-        return replace(camera, response=replace(prior.response, words=HIDDEN))
+        # The response stays linear, but another one is as probable (two values, JCGM 100:2008, 4.3.9).
+        return _not_learnt(camera, HIDDEN, 1.0 - LINEAR_PRIOR)
     response = _response(fits, coding)
     if response.curve.white != assumed.white:  # a video of studio range stays clipped at its white
         response = replace(response, curve=replace(response.curve, white=assumed.white))
@@ -114,13 +119,21 @@ def _is_usable(profile: EdgeProfile) -> bool:
     return profile.contrast > LEAST_CONTRAST and dark > CLIPPED[0] and light < CLIPPED[1]
 
 
-def _fitted(profiles: list[EdgeProfile], model_error: float, tagged: str) -> tuple[list[FamilyFit], float]:
-    """Fits of all flanks; of the outer ones alone if the inner ones, which side walls spoil, do not agree with them."""
-    fits = fit_families(profiles, model_error, tagged=tagged)
+def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[list[FamilyFit], float]:
+    """Fits of all flanks; of the outer ones alone if the inner ones, which side walls spoil, do not agree with them.
+
+    What a codec has lost is inferred only where the optics nearly explain the edges: a coarser quantiser than that of
+    `STEPS` shows as a misfit.
+    """
+    fits = fit_families(profiles, MODEL_ERROR[coding], tagged=tagged)
     misfit = _misfit(fits)
     outer = [profile for profile in profiles if profile.is_outer]
     if misfit > MOST_MISFIT and 0 < len(outer) < len(profiles):
-        fits = fit_families(outer, model_error, tagged=tagged)
+        profiles = outer
+        fits = fit_families(profiles, MODEL_ERROR[coding], tagged=tagged)
+        misfit = _misfit(fits)
+    if misfit <= MOST_MISFIT and coding in STEPS:
+        fits = fit_families(profiles, MODEL_ERROR[coding], tagged=tagged, steps=STEPS[coding])
         misfit = _misfit(fits)
     return fits, misfit
 

@@ -1,0 +1,70 @@
+"""The camera that edges show after a codec: what JPEG and H.264 hide is in the uncertainty."""
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from calib.camera_response import standard_response
+from calib.edge_profile import EdgeProfile, binned_profile
+from fingervision.domain.camera import ASSUMED_CAMERA, ResponseEstimate
+from fingervision.domain.frame import Coding
+from fingervision.vision.learnt_camera import learnt_from_profiles
+from fingervision.vision.response_shift import edge_shift_px, u_edge_px
+
+Floats = NDArray[np.float64]
+# Light of finger and ground, and the Gaussian sigma of a sharp edge (pixels).
+INSIDE, OUTSIDE, SIGMA_PX = 0.07, 0.65, 0.8
+
+
+def jpeg_profiles(name: str, seed: int, quality: int) -> list[EdgeProfile]:
+    """Four slightly tilted edges in six pictures each, through the camera's curve, noise and JPEG."""
+    rng, response = np.random.default_rng(seed), standard_response(name)
+    y, x = np.mgrid[0:72, 0:64]
+    found = []
+    for side in (1.0, -1.0, 1.0, -1.0):
+        away, level = [], []
+        tilt, at = rng.uniform(-0.04, 0.04), rng.uniform(28.0, 36.0)
+        for _ in range(6):
+            at += rng.uniform(-0.3, 0.3)
+            distance = side * (x - at - tilt * (y - 36))
+            light = INSIDE + (OUTSIDE - INSIDE) * ndtr(distance / np.hypot(SIGMA_PX, 12.0**-0.5))
+            light += np.sqrt(light / 8000.0) * rng.standard_normal(light.shape)
+            stored = np.rint(255.0 * np.interp(light, response.light, response.level)).astype(np.uint8)
+            coded = cv2.imencode(".jpg", stored, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+            near = np.abs(distance) < 9.0
+            away.append(distance[near])
+            level.append(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE)[near] / 255.0)
+        group = np.repeat(np.arange(len(away)), [one.size for one in away])
+        bins = binned_profile(np.concatenate(away), np.concatenate(level), group, 1.0 / 255.0, side)
+        assert bins is not None
+        found.append(bins)
+    return found
+
+
+def error_and_u_px(found: ResponseEstimate, name: str) -> tuple[float, float]:
+    """Displacement of an edge by the error of the response, and its stated standard uncertainty."""
+    true = standard_response(name)
+    levels = np.interp((INSIDE, OUTSIDE), true.light, true.level)
+    inside, outside = (float(v) for v in np.interp(levels, found.curve.level, found.curve.light))
+    return edge_shift_px(found.curve, true, inside, outside, SIGMA_PX), u_edge_px(found, inside, outside, SIGMA_PX)
+
+
+@pytest.mark.parametrize("name", ["srgb", "linear"])
+def test_what_jpeg_hides_is_in_the_uncertainty(name: str) -> None:
+    """JPEG removes the fine detail of sharp edges, in which tone curves differ, in every block alike."""
+    for seed in (1, 2, 4):
+        camera = learnt_from_profiles(jpeg_profiles(name, seed, 85), ASSUMED_CAMERA, Coding.INTRAFRAME)
+        error_px, u_px = error_and_u_px(camera.response, name)
+        assert abs(error_px) < 2.0 * u_px + 1e-6
+        assert u_px < 0.15
+
+
+@pytest.mark.parametrize("name", ["srgb", "linear"])
+def test_after_h264_a_linear_and_a_usual_curve_are_equally_probable(name: str) -> None:
+    camera = learnt_from_profiles(jpeg_profiles(name, 1, 85), ASSUMED_CAMERA, Coding.INTERFRAME)
+    assert camera.response.curve is standard_response("linear")
+    assert "H.264" in camera.response.words
+    error_px, u_px = error_and_u_px(camera.response, "srgb")
+    assert u_px == pytest.approx(abs(error_px) / np.sqrt(2.0), rel=0.01)
