@@ -4,7 +4,6 @@
 suggests the run that best distinguishes the remaining explanations (`suggest`). The module needs the extra `bluesky`.
 """
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +13,7 @@ from fingervision.adapters.bluesky import GapDevice, StageDevice
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
 from fingervision.domain.errors import DataError
 from fingervision.models.corrected import CorrectedModel
+from fingervision.storage.row_file import write_table
 from fingervision.tables.read import read_measured_table
 
 ROW = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "force_n")
@@ -65,10 +65,7 @@ class NextRunAgent:
             with TemporaryDirectory(prefix="fingervision-") as folder:
                 path = Path(folder) / "measured.csv"
                 keys = [key for key in ROW if any(row.get(key) is not None for row in self._rows)]
-                with path.open("w", encoding="utf-8", newline="") as file:
-                    writer = csv.writer(file, lineterminator="\n")
-                    writer.writerow(keys)
-                    writer.writerows([["" if row.get(key) is None else row[key] for key in keys] for row in self._rows])
+                write_table(path, keys, ([row.get(key) for key in keys] for row in self._rows), digits=17)
                 self._answer = diagnose(read_measured_table(path), self._model, seed=self._seed)
         return self._answer
 

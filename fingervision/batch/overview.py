@@ -1,9 +1,7 @@
 """Overview of all results: a table, a plot, and an HTML page with a small plot of each result."""
 
-import csv
 import hashlib
 import html
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
@@ -13,6 +11,7 @@ from fingervision.batch.reduction import Reduction, reduction_of
 from fingervision.batch.result_folder import replace_text
 from fingervision.batch.task import Cell, Outcome
 from fingervision.storage.durable import replaced
+from fingervision.storage.row_file import table_text as lines_of
 
 # Small plot of a curve, embedded in the HTML page.
 
@@ -84,26 +83,20 @@ def write_overview(out: Path, command: str, outcomes: Sequence[Outcome]) -> None
 
 def table_text(out: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> str:
     """Return the text of batch.csv: one line per input, with empty cells for missing values."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow((*FIRST_COLUMNS, *reduction.COLUMNS, "seconds"))
+    rows = []
     for outcome in outcomes:
         cells = outcome.digest.cells if outcome.digest is not None else {}
         result = "" if outcome.folder is None else outcome.folder.name
         line: list[Cell] = [outcome.input, result, outcome.exit_code, outcome.words]
         line += [cells.get(name) for name in reduction.COLUMNS]
-        line = [_shown(_no_formula(one)) for one in line]  # a negative number is no formula
-        writer.writerow([*line, f"{outcome.seconds:.3f}" if outcome.folder is not None else ""])
-    return text.getvalue()
+        seconds = f"{outcome.seconds:.3f}" if outcome.folder is not None else ""
+        rows.append([*map(_no_formula, line), seconds])  # a negative number is no formula
+    return lines_of((*FIRST_COLUMNS, *reduction.COLUMNS, "seconds"), rows)
 
 
 def _no_formula(cell: Cell) -> Cell:
     """Put an apostrophe before a name that a spreadsheet would interpret as a formula."""
     return f"'{cell}" if isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t")) else cell
-
-
-def _shown(cell: Cell) -> Cell:
-    return f"{cell:.9g}" if isinstance(cell, float) else ("" if cell is None else cell)
 
 
 def _draw(path: Path, reduction: Reduction, outcomes: Sequence[Outcome]) -> None:

@@ -11,12 +11,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from fingervision.cli._body_picture import draw_body, extent_mm, framed
-from fingervision.cli._mechanism_report import add_endurance, say_drawing, say_endurance, say_refusals, warn
+from fingervision.cli._model_figures import draw_body, extent_mm, framed
 from fingervision.cli._model_grip import part_of_pair, write_pair_grip
 from fingervision.cli._model_motion import MotionAsked, move
-from fingervision.cli._model_sweep import solve_mechanism, sweep_mechanism
-from fingervision.cli._model_uncertainty import write_uncertainty
+from fingervision.cli._model_report import add_endurance, say_drawing, say_endurance, say_refusals, warn
+from fingervision.cli._model_sweep import solve_mechanism, sweep_mechanism, write_uncertainty
 from fingervision.interface.prediction import figures_csv, figures_text, naming, predict_mechanism
 from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.finite_element import MechanismPlate

@@ -1,6 +1,5 @@
 """`fingervision model --frequency`: response of a mechanism to a vibrating drive."""
 
-import csv
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import isfinite, pi
@@ -23,6 +22,7 @@ from fingervision.models.modal_model import (
     resolved_frequencies_hz,
 )
 from fingervision.models.motion_in_time import MODES
+from fingervision.storage.row_file import write_table
 
 _MOST_MODES = 60
 _LEAST_RANGE, _LEAST_DEG = 1.1, 1.0
@@ -142,15 +142,13 @@ def _write_frequencies(found: Mapping[str, FrequencyResponse], path: Path) -> No
         stem = column.removesuffix("_mm")
         header += [f"{stem}_per_input_mm_mm", f"{stem}_phase_deg", f"{stem}_per_force_mm_n", f"{stem}_force_phase_deg"]
     header += ["drive_per_force_mm_n", "drive_force_phase_deg"]
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        for kind, answer in found.items():
-            curves = [curve for c in columns for curve in (answer.per_input[c], answer.per_force_mm_n[c])]
-            curves.append(answer.drive_per_force_mm_n)
-            parts = [part for curve in curves for part in (np.abs(curve), np.degrees(np.angle(curve)))]
-            for row in zip(answer.frequency_hz, *parts, strict=True):
-                writer.writerow([kind, *(f"{value:.7g}" for value in row)])
+    rows: list[list[object]] = []
+    for kind, answer in found.items():
+        curves = [curve for c in columns for curve in (answer.per_input[c], answer.per_force_mm_n[c])]
+        curves.append(answer.drive_per_force_mm_n)
+        parts = [part for curve in curves for part in (np.abs(curve), np.degrees(np.angle(curve)))]
+        rows += [[kind, *row] for row in zip(answer.frequency_hz, *parts, strict=True)]
+    write_table(path, header, rows, digits=7)
 
 
 def _draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title: str, path: Path) -> None:

@@ -1,6 +1,5 @@
 """`fingervision model --object-mm`: gripping force on a part between the fingers, as a table and a plot."""
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot, isfinite
@@ -19,6 +18,7 @@ from fingervision.models.grip import Part, first_grip_mm, gripped
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import GrippedPair, PairGrip
+from fingervision.storage.row_file import write_table
 
 _COLUMNS = ("kind", "input_mm", "gap_mm", "held_width_mm", "grip_n", "force_n", "stress_mpa")
 _ROWS = 61
@@ -75,7 +75,7 @@ def write_grip(
         rows[kind] = np.array([_row(model, float(value), part) for value in at])
         if touch is not None:
             said.append(_words(gripper, kind, model, part, touch, errors[kind]))
-    _write(rows, out / "grip.csv")
+    write_table(out / "grip.csv", _COLUMNS, _lines(rows), digits=7)
     _draw(rows, part, name, out / "grip.png")
     if not as_json:
         for words in said:
@@ -132,7 +132,7 @@ def write_pair_grip(
         at = np.union1d(at, [touch])
     states = [held.at(float(value), part) for value in np.sort(at)]
     rows = {plate.kind: np.array([_cells(state, part) for state in states])}
-    _write(rows, out / "grip.csv")
+    write_table(out / "grip.csv", _COLUMNS, _lines(rows), digits=7)
     _draw(rows, part, f"{plate.mechanism.name}, {asked.pair}", out / "grip.png")
     beyond = held.at(touch + closing, part)
     words = (
@@ -157,12 +157,8 @@ def _cells(state: PairGrip, part: Part) -> tuple[float, ...]:
     return state.input_mm, state.distance_mm, held, state.grip_n, state.force_n, state.stress_mpa
 
 
-def _write(rows: Mapping[str, NDArray[np.float64]], path: Path) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(_COLUMNS)
-        for kind, table in rows.items():
-            writer.writerows([kind, *("" if np.isnan(v) else f"{v:.7g}" for v in row)] for row in table.tolist())
+def _lines(rows: Mapping[str, NDArray[np.float64]]) -> list[list[object]]:
+    return [[kind, *row] for kind, table in rows.items() for row in table.tolist()]
 
 
 def _stiff(part: Part) -> str:

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from fingervision.domain.errors import OutputError
 from fingervision.models.kinds import by_trust
 from fingervision.models.mode_shapes import ModeShape
+from fingervision.storage.row_file import write_table
 
 _A_ROW = 6
 _PICTURES, _PERIODS, _A_SECOND = 24, 4, 24
@@ -34,14 +35,13 @@ _MOST_FILM_MODES = 18
 
 def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, *, film: bool, as_json: bool) -> None:
     """Write modes.csv, modes.png and, if requested, modes.mp4."""
-    lines = ["kind,family,number,frequency_hz"]
+    rows = [(kind, s.family, s.number, s.frequency_hz) for kind, shapes in found.items() for s in shapes]
+    write_table(out / "modes.csv", ("kind", "family", "number", "frequency_hz"), rows, digits=7)
     for kind, shapes in found.items():
-        lines += [f"{kind},{s.family},{s.number},{s.frequency_hz:.7g}" for s in shapes]
         for family in dict.fromkeys(s.family for s in shapes):
             values = ", ".join(f"{s.frequency_hz:.5g}" for s in shapes if s.family == family)
             if not as_json:
                 click.echo(f"{kind}, {family}: {values} Hz")
-    (out / "modes.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     drawn = next((found[kind] for kind in by_trust(found)), ())
     if not drawn:
         click.echo("No natural mode lies in the range that --modes states: no picture is drawn.", err=True)

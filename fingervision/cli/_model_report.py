@@ -1,18 +1,24 @@
-"""Warnings about the limits of the results of the `model` command."""
+"""Remarks of the `model` command: how long the flexures last, what yields, what touches, and what a model omits."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from math import copysign, isfinite
 from typing import Any
 
 import click
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import ModelFigures
-from fingervision.models.gripper_figures import input_at_yield_mm, life_between
+from fingervision.models.elastic_mechanism import MechanismState
+from fingervision.models.gripper_figures import Endurance, endurance, input_at_yield_mm, life_between
 from fingervision.models.kinds import by_trust, small_displacements_alone
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_figures import MechanismModel
 from fingervision.models.notch import notches_of
 from fingervision.models.physics import Physics
+from fingervision.models.strips import necks_of
 
 
 def say_what_limits(
@@ -78,4 +84,88 @@ def _warn_of_stress(gripper: Gripper, model: Any, inputs: NDArray[np.float64]) -
             f"{state.stress_mpa - limit:.3g} MPa too much; stay within "
             f"{input_at_yield_mm(model, state.input_mm, limit):.3g} mm.",
             err=True,
+        )
+
+
+_MOST_NECKS = 3
+
+
+def say_refusals(refusals: Mapping[str, FingervisionError]) -> None:
+    """Print which kinds of model could not be computed, beside those that could."""
+    for name, refusal in refusals.items():
+        click.echo(f"{name} could not be computed: {refusal}", err=True)
+
+
+def say_drawing(mechanism: Mechanism) -> None:
+    """Print which parts are treated as flexures although the drawing does not name them, and what its drives do."""
+    for strip in mechanism.strips:
+        x, y = strip.at_mm
+        click.echo(
+            f"{strip.name} at ({x:.4g}, {y:.4g}) mm, {strip.thickness_mm:.4g} mm thick and "
+            f"{2.0 * strip.half_length_mm:.4g} mm long, is treated as a flexure: it is much thinner than what it joins."
+        )
+    for drive in mechanism.drives:
+        click.echo(drive.words)
+
+
+def warn(
+    mechanism: Mechanism, model: MechanismModel, states: Sequence[MechanismState], at_yield_mm: float, *, contact: bool
+) -> None:
+    """Warn of yielding, and of faces that penetrate each other."""
+    if (corner := getattr(model, "unstated_stress_at_mm", None)) is not None:
+        click.echo(
+            f"Warning: the stress is not stated, because the outline has a re-entrant corner without a radius at "
+            f"({corner[0]:.4g}, {corner[1]:.4g}) mm, where it has no limit: round the corner, or draw the thin strip "
+            "there as a [[flexure]].",
+            err=True,
+        )
+    for (x, y), thickness in necks_of(mechanism.region, mechanism.flexures)[:_MOST_NECKS]:
+        click.echo(
+            f"Warning: the drawing is only {thickness:.3g} mm thick at ({x:.4g}, {y:.4g}) mm, where it names no "
+            "flexure: move the shapes apart there, or draw the neck as a [[flexure]], as its stress is not judged.",
+            err=True,
+        )
+    worst = max(states, key=lambda state: state.stress_mpa)
+    if worst.stress_mpa > mechanism.material.yield_mpa:
+        click.echo(
+            f"Warning: at an input of {worst.input_mm:.3g} mm the stress in the flexures must stay below the yield "
+            f"stress of {mechanism.material.yield_mpa:g} MPa, but is {worst.stress_mpa:.3g} MPa; keep the input within "
+            f"{at_yield_mm:.3g} mm.",
+            err=True,
+        )
+    ends = [state.input_mm for state in (states[0], states[-1])]
+    for name, at_mm in model.touch_input_mm().items():
+        if not contact and min(ends) < at_mm < max(ends):
+            click.echo(
+                f"Warning: the faces of contact {name} touch at an input of {at_mm:.4g} mm; beyond this input, the "
+                f"faces pass through each other, because contact is not computed: add --contact.",
+                err=True,
+            )
+
+
+def add_endurance(mechanism: Mechanism, states: Sequence[MechanismState], figures: dict[str, float]) -> None:
+    """Add the number of load cycles to failure over the range of inputs, if the material has an S-N line.
+
+    The stress is assumed to change its sign with the input.
+    """
+    life = _life(mechanism, states)
+    if life is not None and life.cycles is not None:
+        figures["endurance_cycles"] = life.cycles
+
+
+def _life(mechanism: Mechanism, states: Sequence[MechanismState]) -> Endurance | None:
+    if not isfinite(states[0].stress_mpa):
+        return None
+    ends = sorted(copysign(state.stress_mpa, state.input_mm) for state in (states[0], states[-1]))
+    return endurance(mechanism.material, ends[0], ends[1])
+
+
+def say_endurance(kind: str, mechanism: Mechanism, states: Sequence[MechanismState]) -> None:
+    """Print the number of load cycles that the flexures endure over the range of inputs."""
+    life = _life(mechanism, states)
+    if life is not None:
+        click.echo(
+            f"Endurance between {states[0].input_mm:.3g} and {states[-1].input_mm:.3g} mm ({kind}, the material's S-N "
+            f"line, no scatter): {life.words}; the stress in the flexures changes by "
+            f"+-{life.amplitude_mpa:.3g} MPa about {life.mean_mpa:.3g} MPa."
         )

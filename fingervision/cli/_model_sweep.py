@@ -1,4 +1,4 @@
-"""`fingervision model --vary` and `--solve`: results over dimensions of the drawing, and dimensions for results."""
+"""`fingervision model` with varied, wanted and uncertain dimensions: --vary, --solve, and standard uncertainties."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -15,10 +15,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
+from fingervision.domain.with_uncertainty import with_uncertainty
 from fingervision.models.finite_element import FiniteElementGripper, MechanismPlate
 from fingervision.models.gripper_figures import label_of, unit_of
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.inverse_design import Figures, parse_unknown, parse_wanted, solve_dimensions
+from fingervision.models.kinds import by_trust
 from fingervision.models.lumped import LumpedGripper, MechanismFrame
 from fingervision.models.mechanism_figures import response_figures
 from fingervision.models.parameter_sweep import (
@@ -30,8 +32,10 @@ from fingervision.models.parameter_sweep import (
     sweep_figures,
     varied,
 )
+from fingervision.models.uncertainty import FigureUncertainty
 from fingervision.storage.mechanism_toml import MechanismDrawing
 from fingervision.storage.out_folder import out_folder
+from fingervision.storage.row_file import write_table
 
 _MOST_ROWS_PRINTED = 40
 _MOST_PANELS = 6
@@ -96,9 +100,8 @@ def _solve(
     found = solve_dimensions(unknowns, targets, lumped, lambda values: elements(values) if values else as_drawn)
     rows = [(name, drawn(name), value) for name, value in found.values.items()]
     rows += [(name, value, found.found.get(name, np.nan)) for name, value in found.drawn.items()]
-    lines = ["name,drawn,solved", *(f"{name},{before:.7g},{after:.7g}" for name, before, after in rows)]
     with out_folder(out):
-        (out / "solve.csv").write_text("\n".join(lines).replace("nan", "").replace("-inf", "") + "\n", encoding="utf-8")
+        write_table(out / "solve.csv", ("name", "drawn", "solved"), rows, digits=7)
     if as_json:
         click.echo(json.dumps({name: {"drawn": a, "solved": b} for name, a, b in rows}, indent=2))
         return
@@ -123,9 +126,8 @@ def _write(
     varied = [variation.name for variation in variations]
     table = np.concatenate([values, answers], axis=1)
     header = [*varied, *columns]
-    lines = [",".join(header), *(",".join(f"{v:.7g}" if np.isfinite(v) else "" for v in row) for row in table)]
     with out_folder(out):
-        (out / "vary.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        write_table(out / "vary.csv", header, table.tolist(), digits=7)
         _draw(name, variations, values, columns, answers, out / "vary.png")
     if as_json:
         rows = [{k: (v if np.isfinite(v) else None) for k, v in zip(header, row, strict=True)}
@@ -169,4 +171,94 @@ def _draw(
     if len(variations) > 1:
         label = f"{variations[0].name} / {number_unit(variations[0].name)}"
         figure.colorbar(ScalarMappable(scale, colours), ax=list(grid), label=label)
+    figure.savefig(path, dpi=130)
+
+
+_LEFT_OUT = ("peak_x_mm", "peak_y_mm", "lowest_input_mm", "highest_input_mm")
+_HEADER = ("kind", "figure", "unit", "value", "u", "method", "low_95", "high_95", "first", "first_share", "second",
+           "second_share", "third", "third_share")  # fmt: skip
+_DRAWN = (
+    "gap_per_input",
+    "input_stiffness_n_mm",
+    "peak_stress_mpa_per_mm",
+    "input_at_yield_mm",
+    "first_mode_drive_free_hz",
+    "first_mode_drive_held_hz",
+    "contact_input_mm",
+    "mechanical_advantage",
+)
+
+
+def write_uncertainty(
+    found: Mapping[str, FigureUncertainty], rows: Mapping[str, Mapping[str, float | None]], name: str, out: Path,
+    *, as_json: bool,
+) -> None:  # fmt: skip
+    """Write uncertainty.csv and uncertainty.png, and print the most accurate model's results and main contributions.
+
+    Parameters
+    ----------
+    found : mapping of str to FigureUncertainty
+        Uncertainty of every result, by the name of the result.
+    rows : mapping of str to mapping
+        Results of every kind of model, written beside the uncertainties.
+    name : str
+        Name of the mechanism.
+    out : Path
+        Folder to write to.
+    as_json : bool
+        Whether the output is JSON, so that this function prints nothing.
+    """
+    lines = []
+    for kind, row in rows.items():
+        for figure, own in _stated(found, row).items():
+            value = float(row[figure] or 0.0)
+            low, high = (value + end - own.value for end in own.interval)
+            shares = [part for n, share in own.shares for part in (n, f"{share:.3f}")]
+            cells = [kind, figure, unit_of(figure), value, own.u, _method(own), low, high, *shares]
+            lines.append(cells + [""] * (len(_HEADER) - len(cells)))
+    write_table(out / "uncertainty.csv", _HEADER, lines, digits=6)
+    best = by_trust(rows)[0]
+    stated = _stated(found, rows[best])
+    _draw_shares(stated, rows[best], f"{name}: {best}", out / "uncertainty.png")
+    if as_json:
+        return
+    click.echo(f"Standard uncertainties of the results, caused by the uncertain numbers of the drawing ({best}):")
+    width = max((len(figure) for figure in stated), default=0) + 2
+    for figure, own in stated.items():
+        most = ", ".join(f"{n} {100.0 * share:.0f} %" for n, share in own.shares if share >= 0.005)
+        words = f"{with_uncertainty(float(rows[best][figure] or 0.0), own.u)} {unit_of(figure)}"
+        click.echo(f"  {figure:<{width}}{words:<34}{_method(own):<9}{most}")
+
+
+def _stated(found: Mapping[str, FigureUncertainty], row: Mapping[str, float | None]) -> dict[str, FigureUncertainty]:
+    return {f: own for f, own in found.items() if f not in _LEFT_OUT and row.get(f) is not None}
+
+
+def _method(own: FigureUncertainty) -> str:
+    return "sampled" if own.sampled else "linear"
+
+
+def _draw_shares(
+    stated: Mapping[str, FigureUncertainty], row: Mapping[str, float | None], title: str, path: Path
+) -> None:
+    """Plot, for the main results, the contribution of each dimension to the variance."""
+    names = [figure for figure in _DRAWN if figure in stated] or list(stated)[: len(_DRAWN)]
+    inputs = list(dict.fromkeys(n for figure in names for n, _ in stated[figure].shares))
+    figure = Figure(figsize=(9.0, 1.6 + 0.5 * max(len(names), 1)), layout="constrained")
+    axes = figure.add_subplot()
+    for place, name in enumerate(names):
+        left = 0.0
+        for n, share in stated[name].shares:
+            axes.barh(place, 100.0 * share, left=left, color=f"C{inputs.index(n)}")
+            left += 100.0 * share
+    for place, n in enumerate(inputs):
+        axes.barh(0, 0.0, color=f"C{place}", label=n)
+    labels = [f"{n}\n{with_uncertainty(float(row[n] or 0.0), stated[n].u)} {unit_of(n)}" for n in names]
+    axes.set_yticks(range(len(names)), labels, fontsize="small")
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 100.0)
+    axes.set_xlabel("share of the variance by the three numbers that contribute most / %")
+    axes.set_title(f"{title}, standard uncertainties", fontsize="medium")
+    if inputs:
+        axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.savefig(path, dpi=130)

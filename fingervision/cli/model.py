@@ -172,10 +172,9 @@ def command(
 
     import numpy as np
 
-    from fingervision.cli._mechanism_report import say_refusals
     from fingervision.cli._model_grip import part_asked, write_grip
     from fingervision.cli._model_motion import motion_asked, move
-    from fingervision.cli._model_report import say_what_limits
+    from fingervision.cli._model_report import say_refusals, say_what_limits
     from fingervision.interface.prediction import figures_csv, figures_text, predict_gripper
     from fingervision.models.hinge_correction import HingeTheory
     from fingervision.models.kinds import kinds
@@ -229,7 +228,7 @@ def command(
     (out / "models.csv").write_text(figures_csv(rows), encoding="utf-8")
     click.echo(json.dumps(rows, indent=2) if as_json else figures_text("", rows))
     if uncertain:
-        from fingervision.cli._model_uncertainty import write_uncertainty
+        from fingervision.cli._model_sweep import write_uncertainty
         from fingervision.models.uncertainty import gripper_uncertainty
 
         spread = gripper_uncertainty(gripper, inputs, HingeTheory(hinge), physics)

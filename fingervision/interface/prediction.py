@@ -34,7 +34,7 @@ from fingervision.models.physics import LINEAR, Physics
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import MechanismDrawing, is_mechanism, read_drawing
 from fingervision.storage.out_folder import own_folder
-from fingervision.storage.row_file import write_table
+from fingervision.storage.row_file import table_text, write_table
 from fingervision.storage.simulation_table import POSE, pose_columns
 
 Array = NDArray[np.float64]
@@ -178,7 +178,7 @@ class MechanismPrediction(Prediction):
 
 def _write_columns(path: Path, columns: Mapping[str, Array]) -> None:
     rows = np.column_stack(list(columns.values())).tolist()
-    write_table(path, list(columns), [[None if np.isnan(value) else value for value in row] for row in rows])
+    write_table(path, list(columns), rows)
 
 
 @speaks_python
@@ -460,10 +460,7 @@ def _mechanism_columns(states: Sequence[MechanismState]) -> dict[str, Array]:
 def figures_csv(figures: Mapping[str, Figures]) -> str:
     """Text of models.csv: one line per kind of model, with empty cells for results that a kind does not compute."""
     names = list(dict.fromkeys(name for row in figures.values() for name in row))
-    lines = [["kind", *names]]
-    lines += [[kind, *("" if (x := row.get(name)) is None else f"{x:.7g}" for name in names)]
-              for kind, row in figures.items()]  # fmt: skip
-    return "\n".join(",".join(line) for line in lines) + "\n"
+    return table_text(["kind", *names], ([kind, *map(row.get, names)] for kind, row in figures.items()), digits=7)
 
 
 def figures_text(name: str, figures: Mapping[str, Figures], *, digits: int = 5, least: int = 0) -> str:

@@ -29,6 +29,7 @@ from fingervision.interface.argument_checks import path_of, speaks_python
 from fingervision.interface.notebook import image_html, png_of_figure
 from fingervision.interface.tables import effect_names, model_given
 from fingervision.models.function_model import FunctionModel
+from fingervision.storage.row_file import write_table
 
 if TYPE_CHECKING:
     import os
@@ -159,16 +160,10 @@ class Simulation:
         OutputError
             The file or folder cannot be written.
         """
-        import csv
-
         out = path_of("path", path, "a CSV file")
         columns = self.columns()
         try:
-            with out.open("w", encoding="utf-8", newline="") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(columns)
-                for row in zip(*columns.values(), strict=True):
-                    writer.writerow([cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row])
+            write_table(out, list(columns), zip(*columns.values(), strict=True))
         except OSError as error:
             raise OutputError(f"{out} could not be written ({error.strerror}): name another path.") from error
         return out

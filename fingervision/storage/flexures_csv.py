@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.flexure_outline import FlexureOutline
+from fingervision.storage.row_file import write_table
 
 FLEXURES = "flexures.csv"
 COLUMNS = ("flexure", "frames", "thickness_mm", "u_thickness_mm", "along_mm", "u_along_mm", "across_mm", "u_across_mm")
@@ -13,13 +14,12 @@ COLUMNS = ("flexure", "frames", "thickness_mm", "u_thickness_mm", "along_mm", "u
 
 def write_flexures(path: Path, outlines: Sequence[FlexureOutline]) -> None:
     """Write flexures.csv; an empty cell represents a missing value."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for one in outlines:
-            pairs = (one.thickness_mm, one.along_mm or ("", ""), one.across_mm)
-            cells = [f"{value:.6f}" if value != "" else "" for pair in pairs for value in pair]
-            writer.writerow([one.flexure, one.frames, *cells])
+    rows = []
+    for one in outlines:
+        pairs = (one.thickness_mm, one.along_mm or ("", ""), one.across_mm)
+        cells = [f"{value:.6f}" if value != "" else "" for pair in pairs for value in pair]
+        rows.append([one.flexure, one.frames, *cells])
+    write_table(path, COLUMNS, rows)
 
 
 def flexures_beside(table: Path) -> dict[str, FlexureOutline]:

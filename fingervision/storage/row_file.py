@@ -1,11 +1,13 @@
 """Tables with a record per row: written line by line, complete whenever the program is stopped, and read again."""
 
 import csv
+import io
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from enum import Enum
 from functools import cache
+from math import isfinite
 from operator import attrgetter
 from pathlib import Path
 from time import monotonic
@@ -162,13 +164,24 @@ def quoted(text: str) -> str:
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\n\r') else text
 
 
-def write_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]], comment: str = "") -> None:
-    """Write a table at once, below a comment; numbers with nine significant digits, None as an empty cell."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(f"# {comment}\n" if comment else "")
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(
-            ["" if value is None else f"{value:.9g}" if isinstance(value, float) else value for value in row]
-            for row in rows
-        )
+def table_text(header: Sequence[str], rows: Iterable[Sequence[object]], comment: str = "", digits: int = 9) -> str:
+    """Text of a table below a comment; numbers with significant digits; None and what is not finite are empty cells."""
+    text = io.StringIO()
+    text.write(f"# {comment}\n" if comment else "")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([_shown(value, digits) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _shown(value: object, digits: int) -> object:
+    if isinstance(value, float):
+        return f"{value:.{digits}g}" if isfinite(value) else ""
+    return "" if value is None else value
+
+
+def write_table(
+    path: Path, header: Sequence[str], rows: Iterable[Sequence[object]], comment: str = "", digits: int = 9
+) -> None:
+    """Write a table at once; see `table_text`."""
+    path.write_text(table_text(header, rows, comment, digits), encoding="utf-8", newline="\n")

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from fingervision.domain.region import Region
-from fingervision.rendering.coverage import coverage
 from fingervision.rendering.outline import Motion, disc
+from fingervision.rendering.picture import coverage
 from fingervision.rendering.polygon import polygon
 
 # The Gaussian's tail beyond REACH_SIGMAS, left out on both sides, holds 6e-7; what is left of it here is a sixth.

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from fingervision.domain.errors import DataError
 from fingervision.domain.region import Region
 from fingervision.rendering.camera import Camera
-from fingervision.rendering.coverage import coverage
 from fingervision.rendering.finger import EllipticTip, finger_shape, half_ellipse
 from fingervision.rendering.lens import RadialLens, Tilt, View
 from fingervision.rendering.outline import Line, Outline, Piece, biarcs
+from fingervision.rendering.picture import coverage
 from fingervision.rendering.polygon import polygon
 
 # Biarcs between exactly mapped points: the third power of their spacing times the change of curvature.

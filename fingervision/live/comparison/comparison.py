@@ -1,6 +1,5 @@
 """Comparison of the live measurement with a model: the feature `model` of a view."""
 
-import csv
 import json
 from collections import OrderedDict, deque
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ from fingervision.live.view import View
 from fingervision.models.corrected import CorrectedModel
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.out_folder import out_folder
+from fingervision.storage.row_file import write_table as write_rows
 from fingervision.tables.read import read_model
 
 # A preliminary verdict by the command `diagnose`, in a separate process while the measurement continues.
@@ -164,14 +164,7 @@ def turns(rows: Sequence[GapRow], least_mm: float) -> int:
 
 def write_table(path: Path, rows: Sequence[GapRow]) -> None:
     """Write rows as a measured table."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        for row in rows:
-            cells = [row.run or "1", *(getattr(row, name) for name in COLUMNS[1:])]
-            writer.writerow(
-                ["" if each is None else f"{each:.9g}" if isinstance(each, float) else each for each in cells]
-            )
+    write_rows(path, COLUMNS, ([row.run or "1", *(getattr(row, name) for name in COLUMNS[1:])] for row in rows))
 
 
 def read_verdict(folder: Path, rows: int) -> Verdict:
