@@ -220,30 +220,3 @@ def _ends(middle: Point, angle_rad: float) -> tuple[Point, Point]:
 
 def _between(first: Point, second: Point) -> float:
     return atan2(second[1] - first[1], second[0] - first[0])
-
-
-@dataclass(frozen=True, slots=True)
-class Ready:
-    """A quantity that its gauge has already computed, in pixels and in millimetres.
-
-    Parameters
-    ----------
-    pixels, millimetres : Cell
-        The value in the picture and in the object plane.
-    """
-
-    pixels: Cell
-    millimetres: Cell
-
-    @property
-    def points_px(self) -> tuple[Point, ...]:
-        """An empty array of points, because the values are already computed."""
-        return ()
-
-    def in_pixels(self) -> Cell:
-        """Value in the picture."""
-        return self.pixels
-
-    def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
-        """The value that the gauge computed for the object plane."""
-        return self.millimetres

@@ -1,7 +1,7 @@
 """One straight edge as measured by gauges: its axes, its fitted parameters, and the limits for accepting it."""
 
 from dataclasses import dataclass, replace
-from math import atan, ceil, cos, hypot, pi, sin
+from math import ceil, cos, hypot, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,11 +124,6 @@ class Axes:
         """Corners of a rectangle around a position on the axis t, for drawing."""
         signs = ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
         return Mark(tuple(self.point(t_px + a * half_t_px, b * half_s_px) for a, b in signs))
-
-
-def normal_of(axes: Axes, slope: float) -> float:
-    """Direction (rad) perpendicular to an edge whose slope in the gauge's axes is `slope`."""
-    return (axes.direction_rad - atan(slope) + pi) % (2.0 * pi) - pi
 
 
 # Fit the edges near the expected position of a gauge's edge, and give a reason if the result is refused.

@@ -48,8 +48,6 @@ class MechanismState:
         Poses of the bodies that move.
     drives_n : mapping of str to float
         Force at every driven face, along its direction.
-    stress_place_mm : (float, float)
-        Position of the largest stress at rest.
     faces_mm : mapping of str to float
         Motion of every driven face, along its direction; less than the input where an actuator yields.
     """
@@ -63,7 +61,6 @@ class MechanismState:
     contact_n: dict[str, float]
     bodies: Mapping[str, BodyPose] = field(default_factory=lambda: MappingProxyType({}))
     drives_n: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    stress_place_mm: PointMm = (0.0, 0.0)
     faces_mm: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
@@ -248,7 +245,6 @@ class ElasticMechanism(ABC):
             pressed,
             self.poses(moved, large=large),
             named_by_drive(mechanism, found.drives_n),
-            stress.place_mm,
             named_by_drive(mechanism, self.driven.face_motions(moved, input_mm)),
         )
 

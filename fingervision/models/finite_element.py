@@ -157,7 +157,6 @@ class MechanismPlate(ElasticMechanism):
                 if component in driven:
                     column[dofs[component][nodes]] = share
                     held.append(dofs[component][nodes])
-        self._by_input = self._by_drive @ per_input_of(mechanism)
         free = np.setdiff1d(np.arange(plate.unknowns), np.concatenate(held))
         self._motions = csr_matrix(motions.tocsc()[:, free])
 

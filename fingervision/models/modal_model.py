@@ -266,8 +266,8 @@ class FrequencyResponse:
         drive free.
     drive_per_force_mm_n : ndarray of complex, shape (n,)
         Complex amplitude of the drive per 1 N.
-    modes_hz, free_modes_hz, damping_ratios, free_damping_ratios : ndarray of float
-        Natural frequencies of the modes kept, with the drive held and free, and the damping ratios of these modes.
+    modes_hz, free_modes_hz, damping_ratios : ndarray of float
+        Natural frequencies of the modes kept, with the drive held and free, and the damping ratios of the former.
     """
 
     frequency_hz: Array
@@ -277,7 +277,6 @@ class FrequencyResponse:
     modes_hz: Array
     free_modes_hz: Array
     damping_ratios: Array
-    free_damping_ratios: Array
 
 
 def frequency_response(
@@ -322,7 +321,6 @@ def frequency_response(
         modes_hz=model.modes_hz,
         free_modes_hz=rad_s / (2.0 * pi),
         damping_ratios=ratios,
-        free_damping_ratios=free_ratios,
     )
 
 

@@ -172,10 +172,8 @@ def find_header(lines: Sequence[str], first: int, dialect: Dialect, given: Entry
             return listed
     found: list[tuple[int, int, tuple[str, ...]]] = []
     units, units_at = None, -1
-    blanks = 0
     for at in range(first - 1, max(-1, first - 1 - HEADER_LINES), -1):
         if not lines[at].strip():
-            blanks += 1
             continue
         label, labelled = _labelled(lines[at], dialect)
         if label in LABEL_NAMES:
