@@ -7,6 +7,10 @@ import numpy as np
 from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
 from fingervision.domain.parameter import Parameter
 
+PER_PERIOD = 4.0
+"""Rows on each period, so that it is not mistaken for a longer one; also standard uncertainties of the input in each
+quarter of a period, so that the phase of every row is known."""
+
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
     """Apply the effect: add a position error that repeats with the period of the encoder's scale."""
@@ -18,9 +22,7 @@ def act(input_mm: Array, history: History, values: Values) -> Array:
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
     """Narrow the bounds of the parameters to what the given data can show."""
-    steps = np.abs(np.diff(np.sort(history.input_mm)) if history.time_s is None else np.diff(history.input_mm))
-    moving = steps[steps > max(4.0 * history.input_sigma_mm, 1e-3 * history.input_span_mm / len(steps))]
-    shortest_mm = 4.0 * float(np.median(moving)) if moving.size else np.inf
+    shortest_mm = PER_PERIOD * max(history.resolved_mm, PER_PERIOD * history.input_sigma_mm)
     if shortest_mm >= 0.5 * history.input_span_mm:
         return "the steps of the input are too wide to resolve a period of half the input's range or less"
     # Neighbouring starting values of the period differ by half a cycle over the range, so that no period is missed.

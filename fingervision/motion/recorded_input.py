@@ -150,7 +150,9 @@ class RecordedInput:
             return cls.exact(table, commanded=True)
         record = SmoothedRecord.of(along_mm, time_s, runs)
         rows = np.arange(along_mm.size) if table.path is None else table.path.rows
-        is_motion = record.sigma_mm > 0.0 and _is_motion(table, model, record.blended_mm[rows])
+        is_motion, noise_mm = False, 0.0
+        if record.sigma_mm > 0.0:
+            is_motion, noise_mm = _motion_in_fluctuations(table, model, record.blended_mm[rows])
         exact = record.sigma_mm == 0.0 or is_motion
         smooth = along_mm if exact else record.blended_mm
         low, high = range_mm
@@ -159,7 +161,8 @@ class RecordedInput:
         slope = np.abs(ahead - behind) / (2.0 * reach)
         stamps_mm = slope * input_error_of_stamps(smooth, time_s, runs, table.stamp_s)[rows] if table.stamp_s else None
         if exact:
-            return replace(cls.exact(table, is_motion=is_motion), stamps_mm=stamps_mm)
+            kept = cls.exact(table, is_motion=is_motion)
+            return replace(kept, sigma_mm=noise_mm, error_mm=slope * noise_mm, stamps_mm=stamps_mm)
         snapped_mm, leverage, sigma, step = record.recorded_mm, record.leverage, record.sigma_mm, record.step_mm
         samples, stays = 1.0 / float(np.median(leverage)), leverage < STAYING
         if step > 0.0:
@@ -217,8 +220,13 @@ def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: fl
     return out
 
 
-def _is_motion(table: MeasuredTable, model: Model, smooth: Array) -> bool:
-    """Whether the gap follows the input's fluctuations: the slope of gap over input is then one, else zero."""
+def _motion_in_fluctuations(table: MeasuredTable, model: Model, smooth: Array) -> tuple[bool, float]:
+    """Whether the gap follows the input's fluctuations, and the noise of the record among them (mm).
+
+    The slope of the gap over the fluctuations is one for a motion, and zero for noise; between the two it is the share
+    of motion in their power, and the rest is noise of the record. For example, smoothing rounds the corners of a
+    staircase, which the gap then seems to follow, while the stage rests on every step.
+    """
     expected = model.respond(table.input_mm).gap_mm - model.respond(smooth).gap_mm
     residual = table.gap_mm - model.respond(smooth).gap_mm
     a = np.concatenate([np.diff(expected[run]) for run in table.runs])
@@ -226,4 +234,9 @@ def _is_motion(table: MeasuredTable, model: Model, smooth: Array) -> bool:
     typical = 5.0 * np.median(np.abs(b)) + 1e-12
     kept = np.abs(b) < typical
     power, doubt = float(a[kept] @ a[kept]), float(np.std(b[kept]))
-    return power > 0.0 and float(a[kept] @ b[kept]) > max(0.5 * power, SURELY * doubt * np.sqrt(power))
+    along = float(a[kept] @ b[kept])
+    if power == 0.0 or along <= max(0.5 * power, SURELY * doubt * np.sqrt(power)):
+        return False, 0.0
+    # The difference of two rows has the noise of both.
+    moves = np.concatenate([np.diff((table.input_mm - smooth)[run]) for run in table.runs])[kept]
+    return True, float(np.sqrt(max(0.0, 1.0 - along / power) * np.mean(moves**2) / 2.0))

@@ -49,7 +49,7 @@ class Evidence:
             return False
         gained = base.score - ranked[0].score
         least = asked[ranked[0].names]
-        if gained <= least:
+        if gained <= max(least, self._averaging_gains(ranked[0], base)):
             return False
         if gained > CLEARLY * least and not (jumps_astray(self.problem, base.names) or self._averages(ranked[0], base)):
             return True
@@ -59,6 +59,21 @@ class Evidence:
             if set(base.names) <= set(e.names)
         ]
         return exceeds_noise(gained - least, self.problem, self.atoms, self.thresholds, base, suspects, self.rng)
+
+    def _averaging_gains(self, one: Explanation, base: Explanation) -> float:
+        """Largest gain of an effect that only removes the errors of the recorded input: with memory, or at an end.
+
+        It is at most what the errors that differ from row to row contribute to chi-square: a play of two standard
+        uncertainties of the record removed the noise of all readings at rest, an end stop that of a rest at an end.
+        What smoothing has left is common to `input_samples` rows, and is not removed.
+        """
+        added = [self.problem.effects[name] for name in one.names if name not in base.names]
+        if not any(effect.memory or effect.stands_at for effect in added):
+            return 0.0
+        whitener = self.problem.whitener
+        errors = whitener.passing_mm**2 + whitener.input_mm**2
+        share = errors / (errors + whitener.noises[0].total_mm ** 2)
+        return float(np.sum(share)) / max(1.0, whitener.input_samples)
 
     def _averages(self, one: Explanation, base: Explanation) -> bool:
         """Whether an explanation may gain only because it averages the errors of the recorded input.
