@@ -93,8 +93,10 @@ class FrameNumbers:
         self._since_key, self._key_every, self._has_seen_key = 0, 0, False
         # Picture number at which the recovery is complete, and number of pictures since its start.
         self._recovering: tuple[int, int] | None = None
-        with av.logging.Capture(local=False) as log:
-            # FFmpeg's filter that writes all fields of the headers into the log, those of the parameter sets first.
+        # FFmpeg's filter that writes all fields of the headers into the log, those of the parameter sets first; it
+        # does not begin where these are damaged, which the decoder says at each picture that it cannot decode.
+        self._headers: BitStreamFilterContext | None = None
+        with av.logging.Capture(local=False) as log, suppress(av.FFmpegError):
             self._headers = BitStreamFilterContext("trace_headers", stream)
         stated = _fields(log)
         self._modulus = 1 << stated.get("log2_max_frame_num_minus4", 0) + LEAST_BITS
@@ -156,6 +158,8 @@ class FrameNumbers:
 
     def _header(self, packet: "av.Packet[av.VideoStream]", heard: Heard) -> dict[str, int]:
         """Fields of a packet's headers; of fields that occur twice the first, none if they cannot be read."""
+        if self._headers is None:
+            return {}
         heard.log.clear()
         with suppress(av.FFmpegError):
             self._headers.filter(av.Packet(bytes(packet)))

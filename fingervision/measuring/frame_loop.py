@@ -16,6 +16,7 @@ from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import Description, FrameSource
+from fingervision.measuring.beside_damage import confirmed_beside_damage
 from fingervision.measuring.camera_learning import learnt_first
 from fingervision.measuring.frame_sequence import Judged, in_sequence
 from fingervision.measuring.gap_budget import gap_budget
@@ -277,7 +278,7 @@ def _outcomes(
         first, series.camera = learnt_first(
             coded(frames, how.description.coding), how.settings, how.row_maker.scale, is_stopped
         )
-        yield from with_lag(in_sequence(judged(first)), series.camera.lag)
+        yield from with_lag(confirmed_beside_damage(in_sequence(judged(first))), series.camera.lag)
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:

@@ -1,6 +1,7 @@
 """Missing pictures: every frame that is passed on as undamaged shows the complete recording's picture of that time."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.frames.luma import luma
 from fingervision.frames.source import open_source
@@ -183,3 +185,14 @@ def test_other_codecs_tell_of_missing_pictures_too(tmp_path: Path, coder: str) -
     truth = coded(path, coder, **more)
     for gone in ({7}, {21, 50}, {40}):
         assert wrong(without(path, gone), truth) == [], gone
+
+
+def test_damaged_headers_of_a_file_are_told_or_do_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "film.mp4"
+    coded(path)
+    content = path.read_bytes()
+    first = content.index(b"avcC") + 4
+    for byte in range(first + 8, first + 24):
+        path.write_bytes(content[:byte] + b"\xff" + content[byte + 1 :])
+        with suppress(FingervisionError):
+            statuses(path)

@@ -8,7 +8,9 @@ import pytest
 
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement
-from fingervision.measuring.frame_sequence import in_sequence
+from fingervision.domain.status import Status
+from fingervision.measuring.beside_damage import confirmed_beside_damage
+from fingervision.measuring.frame_sequence import Judged, in_sequence
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 
@@ -135,3 +137,38 @@ def test_one_finger_alone_does_not_move_along_itself() -> None:
             levels[-6:] = levels[-7]
 
     assert refused(MOTIONS["slow"], change) == [6]
+
+
+def kept_beside_damage(gaps_px: list[float], shown: dict[int, int], lost: set[int]) -> set[int]:
+    """Numbers of the frames that keep their gap if frames `lost` are damaged, and others show an older picture."""
+    results: list[Judged] = []
+    for k in range(len(gaps_px)):
+        frame = Frame(picture(gaps_px[shown.get(k, k)], k % 3), k, k / 25)
+        outcome = LostFrame(k, k / 25, Status.DAMAGED, "damaged") if k in lost else measure_frame(frame, SETTINGS)
+        results.append((frame, outcome))
+    judged = list(confirmed_beside_damage(in_sequence(results)))
+    assert [item.index for item, _ in judged] == list(range(len(gaps_px)))
+    return {item.index for item, outcome in judged if isinstance(outcome, GapMeasurement)}
+
+
+SLOW = [70.0 + 0.5 * k for k in range(20)]
+
+
+@pytest.mark.parametrize(("shown", "lost"), [({10: 3}, {11}), ({10: 3}, {9}), ({10: 6}, {8, 9, 11}), ({19: 12}, {18})])
+def test_an_older_picture_beside_damaged_ones_is_refused(shown: dict[int, int], lost: set[int]) -> None:
+    assert kept_beside_damage(SLOW, shown, lost) == {*range(20)} - lost - {*shown}
+
+
+@pytest.mark.parametrize("lost", [{9}, {10}, {6, 7, 9}, {12, 14}, {0}, {19}])
+@pytest.mark.parametrize(
+    "gaps_px",
+    [
+        [70.0] * 20,
+        SLOW,
+        [70.0 + 15.0 * np.sin(1.1 * k) for k in range(20)],
+        [70.0 + 0.5 * abs((k + 5) % 10 - 5) for k in range(20)],
+    ],
+    ids=["rest", "slow", "vibration", "there and back"],
+)
+def test_true_pictures_beside_damaged_ones_are_kept(gaps_px: list[float], lost: set[int]) -> None:
+    assert kept_beside_damage(gaps_px, {}, lost) == {*range(20)} - lost

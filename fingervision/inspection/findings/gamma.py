@@ -1,6 +1,7 @@
 """Gamma: the camera's transfer curve is assumed, or learnt from the shape of the edges, and was not measured."""
 
 from fingervision.domain.camera import Origin
+from fingervision.domain.frame import Coding
 from fingervision.inspection.finding import Finding, weighed
 from fingervision.inspection.sample import Sample
 
@@ -34,4 +35,8 @@ def find(sample: Sample) -> Finding | None:
             f"The levels are assumed to be {response.curve.name}; another response would change the gap by "
             f"{cost_px:.2f} px (standard uncertainty)."
         )
-    return weighed(sample, "gamma", cost_px, figure, REMEDY, FORMULA, is_doubt=response.origin is Origin.ASSUMED)
+    # Nothing is to be mended as long as linear levels are the likeliest, whatever the shape of the edges leaves open; a
+    # codec that loses details also makes edges that no usual curve explains.
+    is_lossy = sample.description.coding is not Coding.LOSSLESS
+    is_doubt = response.curve.name == "linear" and (is_lossy or all(other.weight < 0.5 for other in response.others))
+    return weighed(sample, "gamma", cost_px, figure, REMEDY, FORMULA, is_doubt=is_doubt)
