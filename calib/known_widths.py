@@ -46,7 +46,12 @@ class KnownSize:
     size_mm, u_size_mm : float
         Certified size and its standard uncertainty.
     grey : ndarray, shape (height, width)
-        Original grey levels.
+        Original grey levels, of any type and full scale.
+
+    Raises
+    ------
+    CalibrationError
+        The kind is another word, the array has colours, or the size or its uncertainty is impossible.
     """
 
     name: str
@@ -58,7 +63,12 @@ class KnownSize:
     def __post_init__(self) -> None:
         """Refuse an impossible size."""
         if self.kind not in KINDS:
-            raise CalibrationError(f"{self.name} must show a bar or a slot, but {self.kind!r} is stated.")
+            raise CalibrationError(f"The kind of {self.name} must be 'bar' or 'slot', but is {self.kind!r}.")
+        if np.ndim(self.grey) != 2:
+            raise CalibrationError(
+                f"{self.name} must be an array of grey levels of shape (height, width), but its shape is "
+                f"{np.shape(self.grey)}: convert colours to grey first, such as by .mean(axis=2)."
+            )
         if not (isfinite(self.size_mm) and self.size_mm > 0.0):
             raise CalibrationError(f"The size of {self.name} must be positive, but is {self.size_mm} mm.")
         if not (isfinite(self.u_size_mm) and self.u_size_mm >= 0.0):

@@ -5,8 +5,8 @@ readable and flyable: each measured frame is one event, with stage position and 
 suggests the next run.
 
 The adapter is tested with a RunEngine of bluesky 1.15 on the simulated test bed (tests/adapters/test_bluesky.py); on
-hardware, only the devices of the test bed are tested. A simulated test bed must be opened with `pace=1`, so that its
-time advances in the same way for every device. Protocols: bluesky.protocols,
+hardware, only the devices of the test bed are tested. A simulated test bed must be opened with `real_time=True`, so
+that its time advances in the same way for every device. Protocols: bluesky.protocols,
 https://blueskyproject.io/bluesky/main/hardware.html. The adapter needs the extra `bluesky`.
 """
 
@@ -17,8 +17,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from fingervision.domain.errors import DeviceError, LimitError, StateError
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError, DeviceError, LimitError, StateError
 from fingervision.testbed.bed import Bed
+from fingervision.testbed.clocks.clock import VirtualClock
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.run.synchronised_acquisition import Sight
 
@@ -379,8 +380,27 @@ class Devices(NamedTuple):
     gap: GapDevice | None
 
 
-def devices(bed: Bed, *, prefix: str = "") -> Devices:
-    """Make the bluesky devices `stage`, `force` and `gap` of an open test bed; each name begins with `prefix`."""
+def devices(bed: "Bed | Any", *, prefix: str = "") -> Devices:
+    """Make the bluesky devices `stage`, `force` and `gap` of an open test bed; each name begins with `prefix`.
+
+    Parameters
+    ----------
+    bed : OpenBed or Bed
+        What `fingervision.bed` opened; a simulated test bed with `real_time=True`.
+    prefix : str
+        Beginning of the devices' names.
+
+    Raises
+    ------
+    ArgumentError
+        The argument is no open test bed, or its simulated time does not keep pace with that of bluesky.
+    """
+    bed = getattr(bed, "bed", bed)
+    if not isinstance(bed, Bed):
+        raise ArgumentTypeError("bed", "be an open test bed (fingervision.bed)", f"is a {type(bed).__name__}")
+    if isinstance(bed.clock, VirtualClock) and bed.clock.pace == 0.0:
+        advice = "open it with fingervision.bed(..., real_time=True)"
+        raise ArgumentError("bed", "run in real time for bluesky", "is not paced", advice)
     lock, unix_s = threading.RLock(), time.time() - bed.clock.now_s()
     shared = _Shared(bed.actuator, lock)
     return Devices(

@@ -136,11 +136,14 @@ class Row:
         The command's options for this input, without --out.
     options_key : str
         As in `Job`.
+    missing : str
+        Why the input cannot be processed; empty if it can.
     """
 
     input: str
     arguments: tuple[str, ...]
     options_key: str
+    missing: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +196,7 @@ class Plan:
     tasks : tuple of Task
         One for each input.
     done : dict of int to Outcome
-        Outcomes of inputs that have a result already, by index in `tasks`.
+        Outcomes of inputs that have a result already, or can have none, by index in `tasks`.
     """
 
     job: Job
@@ -284,6 +287,8 @@ def planned(job: Job) -> Plan:
         same = record is not None and record.options_key == row.options_key and _is_untouched(record, path)
         if record is not None and same and is_whole(folder, record):
             done[number] = outcome_of(row.input, folder, record)
+        if row.missing:
+            done[number] = failure(tasks[number], row.missing)
     return Plan(job, tuple(tasks), done)
 
 

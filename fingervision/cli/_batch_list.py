@@ -31,10 +31,13 @@ class ListedRun:
         The recording or the table.
     options : mapping of click.Option to object
         Options that the row states.
+    missing : str
+        Why the recording cannot be diagnosed: it has not been measured. Empty otherwise.
     """
 
     input: str
     options: Mapping[click.Option, Any]
+    missing: str = ""
 
 
 def listed_runs(
@@ -75,15 +78,20 @@ def listed_runs(
             raise DataError(
                 f"{column} must name a file in every row, but line {line} of {path} has none: fill the cell."
             )
-        chosen = str(_beside(path, cell))
-        if results is not None:
-            chosen = str(_gaps_of(results, chosen, line))
+        chosen, missing = str(_beside(path, cell)), ""
+        if results is not None and (gaps := _gaps_of(results, chosen)) is not None:
+            chosen = str(gaps)
+        elif results is not None:
+            missing = (
+                f"{chosen} must have its gaps in {results}, but has none (line {line} of the list): measure it with "
+                "`fingervision batch measure`."
+            )
         stated = {
             known[name.replace("_", "-")]: _value(known[name.replace("_", "-")], text, path, line)
             for name in names
             if name.replace("_", "-") in known and name != column and (text := _texts(table, name)[row])
         }
-        found.append(ListedRun(chosen, stated))
+        found.append(ListedRun(chosen, stated, missing))
     places = [os.path.abspath(each.input) for each in found]  # noqa: PTH100 - links keep their own names
     for row, place in enumerate(places):
         if places.index(place) < row:
@@ -129,17 +137,14 @@ def _converted(option: click.Option, text: str, path: Path) -> Any:
     return option.type.convert(cell, option, None)
 
 
-def _gaps_of(results: Path, recording: str, line: int) -> Path:
+def _gaps_of(results: Path, recording: str) -> Path | None:
     """Find the table that `batch measure` wrote for a recording."""
     place = os.path.abspath(recording)  # noqa: PTH100 - links keep their own names
     for folder in _folders(results):
         record = read_record(folder)
         if record is not None and record.input == place:
             return folder / GAPS
-    raise InputFileError(
-        f"{results} must hold the gaps of every recording, but has none of {recording} (line {line} of the list): run "
-        "`fingervision batch measure --list` first."
-    )
+    return None
 
 
 def _folders(results: Path) -> Iterator[Path]:

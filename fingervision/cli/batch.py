@@ -259,7 +259,9 @@ def _rows_of(
     rows = []
     for each in listed_runs(path, name, options_of(name), others, results):
         stated = {**given, **each.options}
-        rows.append(Row(each.input, tuple(_arguments(stated, absolute=is_far)), _options_key(name, stated)))
+        rows.append(
+            Row(each.input, tuple(_arguments(stated, absolute=is_far)), _options_key(name, stated), each.missing)
+        )
     return tuple(rows)
 
 

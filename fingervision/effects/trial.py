@@ -1,5 +1,6 @@
 """Check that an object is a valid effect, by its fields and by its response on a few samples."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from types import ModuleType
@@ -14,6 +15,8 @@ from fingervision.plugins.faults import MisfitError
 
 BUILT_IN: list[Effect] = []
 """The built-in effects; the package `fingervision.effects` fills this list."""
+ROUNDING_MM = 1e-9
+"""Tolerance for rounding errors of a few operations on numbers of some millimetres."""
 SAMPLES = 12
 """Number of samples in the trial: two runs of opening and return, with reversals and starts of runs."""
 
@@ -92,11 +95,26 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
     if isinstance(searched, str):
         return effect  # the effect cannot be seen in so few samples
     values = {p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) for p in searched}
+    neutral = neutral_values(searched)
     try:
-        _answer(effect, history, values)
+        _moved_mm(effect, history, values)
+        moved_mm = [_moved_mm(effect, history, each) for each in (neutral, dict.fromkeys(neutral, 0.0))]
     except EffectAnswerError as error:
         raise MisfitError(str(error).split(f"{name} ", 1)[1].split(": correct it")[0]) from error
+    if min(moved_mm) > ROUNDING_MM:
+        raise MisfitError(
+            f"must change nothing at {_told(neutral)} or with all of them 0, but changes its input by "
+            f"{moved_mm[0]:.3g} and {moved_mm[1]:.3g} mm"
+        )
     return effect
+
+
+def neutral_values(searched: Iterable[Parameter]) -> dict[str, float]:
+    """Parameter values at which an effect must change nothing; shape parameters get their starting values."""
+    return {
+        p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) if p.neutral is None else p.neutral
+        for p in searched
+    }
 
 
 def guarded(effect: DriveEffect | PointEffect) -> Effect:
@@ -120,12 +138,15 @@ def trial_history() -> History:
     )
 
 
-def _answer(effect: DriveEffect | PointEffect, history: History, values: Values) -> None:
+def _moved_mm(effect: DriveEffect | PointEffect, history: History, values: Values) -> float:
+    """Largest change (mm, or N of the force) that an effect makes to the samples of the trial."""
     if isinstance(effect, DriveEffect):
-        _checked_drive(effect, history.input_mm, history, values)
-        return
+        return float(np.max(np.abs(_checked_drive(effect, history.input_mm, history, values) - history.input_mm)))
     gap = 4.0 + 7.5 * history.input_mm
-    _checked_points(effect, Response(0.3 - 0.5 * gap, 0.3 + 0.5 * gap, 2.0 * history.input_mm), history, values)
+    given = Response(0.3 - 0.5 * gap, 0.3 + 0.5 * gap, 2.0 * history.input_mm)
+    answer = _checked_points(effect, given, history, values)
+    pairs = [(getattr(one, name) for one in (given, answer)) for name in ("left_mm", "right_mm", "force_n")]
+    return max(float(np.max(np.abs(after - before))) for before, after in pairs)
 
 
 def _checked_drive(effect: DriveEffect, input_mm: Array, history: History, values: Values) -> Array:
@@ -148,7 +169,8 @@ def _checked_points(effect: PointEffect, response: Response, history: History, v
     except Exception as error:
         raise EffectAnswerError(effect.name, _raised(error, values)) from error
     if not isinstance(answer, Response):
-        raise EffectAnswerError(effect.name, f"must return a Response, but returned a {type(answer).__name__}")
+        found = f"returned a {type(answer).__name__} (the first argument's with_gap(gap_mm) makes a Response)"
+        raise EffectAnswerError(effect.name, f"must return a Response, but {found}")
     for side in ("left_mm", "right_mm"):
         _same(effect.name, side, getattr(answer, side), response.left_mm.shape, values)
     if (answer.force_n is None) != (response.force_n is None):

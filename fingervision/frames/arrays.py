@@ -1,7 +1,7 @@
 """Pictures in memory as a recording: numpy arrays of any bit depth, grey or colour, all at once or one by one."""
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence, Sized
+from collections.abc import Iterable, Iterator, Sized
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import ArgumentError, StateError
+from fingervision.domain.errors import ArgumentError, ArgumentTypeError, StateError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
-from fingervision.frames.array_levels import COLOURS, levels_of, stated_shape
+from fingervision.frames.array_levels import COLOURS, levels_of, stated_shape, what_it_is
 from fingervision.frames.source import Description
 
 HASH_DIGITS = 12
@@ -32,7 +32,7 @@ class ArrayFrames:
         pictures.
     rate_hz : float or None
         Pictures per second.
-    times_s : sequence of float or None
+    times_s : iterable of float or None
         Time of every picture; strictly increasing.
     coding : Coding
         Compression that the pictures underwent before they were decoded.
@@ -48,9 +48,10 @@ class ArrayFrames:
 
     pictures: NDArray[np.generic] = field(repr=False)
     rate_hz: float | None = None
-    times_s: Sequence[float] | None = None
+    times_s: Iterable[float] | None = None
     coding: Coding = Coding.LOSSLESS
     description: Description = field(init=False)
+    _times_s: tuple[float, ...] | None = field(init=False, repr=False)
     _stack: NDArray[np.generic] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -60,7 +61,7 @@ class ArrayFrames:
         whole = hashlib.sha256(f"{stack.shape} {stack.dtype.str}".encode())
         for picture in stack:
             whole.update(np.ascontiguousarray(picture).data)
-        object.__setattr__(self, "times_s", times_s)
+        object.__setattr__(self, "_times_s", times_s)
         object.__setattr__(self, "_stack", stack)
         object.__setattr__(
             self,
@@ -91,8 +92,8 @@ class ArrayFrames:
         return bool(self.pictures.dtype.kind == "f")
 
     def _time_s(self, index: int) -> float | None:
-        if self.times_s is not None:
-            return self.times_s[index]
+        if self._times_s is not None:
+            return self._times_s[index]
         return None if self.rate_hz is None else index / self.rate_hz
 
 
@@ -109,7 +110,7 @@ class PictureStream:
         Pictures of equal size, with levels as in `ArrayFrames`.
     rate_hz : float or None
         Pictures per second.
-    times_s : sequence of float or None
+    times_s : iterable of float or None
         Time of every picture; strictly increasing.
     coding : Coding
         Compression that the pictures underwent before they were decoded.
@@ -124,9 +125,10 @@ class PictureStream:
 
     pictures: Iterable[NDArray[np.generic]] = field(repr=False)
     rate_hz: float | None = None
-    times_s: Sequence[float] | None = None
+    times_s: Iterable[float] | None = None
     coding: Coding = Coding.LOSSLESS
     description: Description = field(init=False)
+    _times_s: tuple[float, ...] | None = field(init=False, repr=False)
     _read: Iterator[NDArray[np.generic]] | None = field(init=False, repr=False)
     _first: NDArray[np.generic] = field(init=False, repr=False)
     _is_once: bool = field(init=False, repr=False)
@@ -134,8 +136,7 @@ class PictureStream:
     def __post_init__(self) -> None:
         _check_rate(self.rate_hz, self.times_s)
         count = len(self.pictures) if isinstance(self.pictures, Sized) else None
-        if self.times_s is not None:
-            self.times_s = _checked_times(self.times_s, len(self.times_s) if count is None else count)
+        self._times_s = None if self.times_s is None else _checked_times(self.times_s, count)
         rest = iter(self.pictures)
         self._is_once = rest is self.pictures
         first = next(rest, None)
@@ -151,7 +152,7 @@ class PictureStream:
             width_px=int(self._first.shape[1]),
             height_px=int(self._first.shape[0]),
             rate_hz=self.rate_hz,
-            has_times=self.rate_hz is not None or self.times_s is not None,
+            has_times=self.rate_hz is not None or self._times_s is not None,
             frame_count=count,
         )
 
@@ -179,7 +180,12 @@ class PictureStream:
                 must = f"yield pictures like the first ({self._first.dtype}, shape {self._first.shape})"
                 found = f"picture {index} is {single.dtype} of shape {single.shape}"
                 raise ArgumentError("source", must, found)
-            yield Frame(levels_of(single, f" of picture {index}"), index, self._time_s(index), self.coding)
+            # Copied, because frames are read ahead and a generator may use its array again for the next picture.
+            levels = levels_of(single.copy(), f" of picture {index}")
+            yield Frame(levels, index, self._time_s(index), self.coding)
+        if self._times_s is not None and len(self._times_s) != index + 1:
+            found = f"{len(self._times_s)} are given"
+            raise ArgumentError("times_s", f"be one number for each of the {index + 1} pictures", found)
 
     def __getstate__(self) -> dict[str, Any]:
         """State without what cannot be pickled: the pictures of a generator."""
@@ -191,15 +197,18 @@ class PictureStream:
         return bool(self._first.dtype.kind == "f")
 
     def _time_s(self, index: int) -> float | None:
-        if self.times_s is None:
+        if self._times_s is None:
             return None if self.rate_hz is None else index / self.rate_hz
-        if index >= len(self.times_s):
+        if index >= len(self._times_s):
             raise ArgumentError("times_s", "have a time for every picture", f"ends before picture {index}")
-        return self.times_s[index]
+        return self._times_s[index]
 
 
 def _single(picture: Any, index: int) -> NDArray[np.generic]:
     """Check that something that was yielded is one picture, of shape (height, width) or (height, width, colours)."""
+    if isinstance(picture, Frame | LostFrame):
+        must = "have a `description` (a fingervision.Description) if it yields frames, or yield arrays"
+        raise ArgumentTypeError("source", must, f"yields {what_it_is(picture)} and has none")
     stack = stated_shape(picture, "source" if index == 0 else f"source, picture {index},")
     if len(stack) > 1 or picture.ndim > 3:
         must = f"yield pictures of shape (height, width) or (height, width, {' or '.join(map(str, COLOURS))})"
@@ -207,7 +216,7 @@ def _single(picture: Any, index: int) -> NDArray[np.generic]:
     return picture if picture.ndim == 2 else np.asarray(picture.reshape(stack.shape[1:]))
 
 
-def _check_rate(rate_hz: float | None, times_s: Sequence[float] | None) -> None:
+def _check_rate(rate_hz: float | None, times_s: Iterable[float] | None) -> None:
     if rate_hz is not None and times_s is not None:
         raise ArgumentError("rate_hz", "be left out if times_s is given", "both are given")
     if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
@@ -234,13 +243,14 @@ class KeptFrames:
         return iter(self.frames)
 
 
-def _checked_times(times_s: Sequence[float], count: int) -> tuple[float, ...]:
+def _checked_times(times_s: Iterable[float], count: int | None) -> tuple[float, ...]:
     try:
-        times = np.asarray(times_s, dtype=np.float64)
+        times = np.asarray(times_s if isinstance(times_s, Sized) else list(times_s), dtype=np.float64)
     except (TypeError, ValueError):
         raise ArgumentError("times_s", "be one number for each picture, in seconds", f"is {times_s!r}") from None
-    if times.shape != (count,):
-        raise ArgumentError("times_s", f"be one number for each of the {count} pictures", f"has shape {times.shape}")
+    if times.shape != (len(times) if count is None and times.ndim else count,):
+        which = "each picture" if count is None else f"each of the {count} pictures"
+        raise ArgumentError("times_s", f"be one number for {which}", f"has shape {times.shape}")
     if not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
         raise ArgumentError("times_s", "be finite and increase from picture to picture", "does not")
     return tuple(times.tolist())

@@ -5,7 +5,7 @@ import logging
 import pkgutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from math import isfinite
 from pathlib import Path
 from typing import Protocol, cast
@@ -35,11 +35,11 @@ class Description:
     coding : Coding
         Whether the compression is lossy: errors of neighbouring pixels are then correlated.
     width_px, height_px : int
-        Size of every frame; a frame of another size counts as damaged.
+        Size of every picture.
     rate_hz : float or None
         Mean frame rate stated by the source; None if not stated. Times are never derived from it.
     has_times : bool
-        Whether frames have times.
+        Whether every picture has a time.
     frame_count : int or None
         Number of frames that the source announces; only used to show progress.
     files : tuple of Path
@@ -196,23 +196,30 @@ def _accepts(entry: Entry[SourceKind], name: str) -> bool:
 
 
 def _opened(entry: Entry[SourceKind], name: str, wish: Wish) -> FrameSource:
+    from fingervision.frames.checked_frames import CheckedFrames  # which imports this module
+
     if entry.origin.built_in:
         return entry.value.open_frames(name, wish)
     who = f"The frame source {entry.name} of {entry.origin}"
     try:
         source = entry.value.open_frames(name, wish)
-        described = isinstance(source.description, Description)
+        described = hasattr(source, "description") and hasattr(source, "__iter__")
     except FingervisionError:
         raise
     except Exception as error:
         said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
         raise PluginShapeError(f"{who} could not open {name} ({said}): {entry.origin.remedy}.") from error
-    if not (described and hasattr(source, "__iter__")):
+    if not described:
         raise PluginShapeError(
             f"{who} must return a frame source (an iterable object with a Description), but returned a "
             f"{type(source).__name__}: {entry.origin.remedy}."
         )
-    return source
+    refused = partial(_refused, f"{entry.name} of {entry.origin}", entry.origin.remedy)
+    return CheckedFrames(source, wish.rate_hz, refused, is_plugin=True)
+
+
+def _refused(who: str, remedy: str, must: str, found: str) -> PluginShapeError:
+    return PluginShapeError(f"The frame source {who} must {must}, but {found}: {remedy}.")
 
 
 def kinds() -> list[SourceKind]:

@@ -1,7 +1,7 @@
 """Open a recording from a file name, the number of a camera, an array, or a frame source."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -13,7 +13,8 @@ from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UsageEr
 from fingervision.domain.frame import Coding
 from fingervision.frames.array_levels import what_it_is
 from fingervision.frames.arrays import ArrayFrames, KeptFrames, PictureStream
-from fingervision.frames.source import Description, FrameSource, Wish, open_source
+from fingervision.frames.checked_frames import CheckedFrames
+from fingervision.frames.source import FrameSource, Wish, open_source
 from fingervision.interface.argument_checks import number, one_of, whole_number
 
 MUST = (
@@ -38,7 +39,7 @@ def recording_of(
     source: Any,
     *,
     rate_hz: float | None = None,
-    times_s: Sequence[float] | None = None,
+    times_s: Iterable[float] | None = None,
     frames: int | None = None,
     coding: str = "lossless",
 ) -> Opener:
@@ -71,14 +72,15 @@ def recording_of(
         return _Same(stream)
     if times_s is not None:
         raise UsageError(
-            "times_s is for arrays only: leave it out, and put the times of a folder of images into its times.csv."
+            "times_s is for pictures in arrays: leave it out. The times of a folder of images belong into its "
+            "times.csv, and a source of your own yields them."
         )
     if stored is not Coding.LOSSLESS:
-        raise UsageError("coding is for arrays only, since a file states its own coding: leave it out.")
+        raise UsageError("coding is for pictures in arrays, since a file states its own coding: leave it out.")
     if isinstance(source, bool) or not isinstance(source, str | os.PathLike | int | np.integer):
         if not hasattr(source, "description"):
             raise ArgumentTypeError("source", MUST, f"is {what_it_is(source)}")
-        given = _own_source(source)
+        given = _own_source(source, rate_hz)
         return _camera(given, frames) if hasattr(given, "received") else _recording(_Same(given), frames)
     name = str(int(source)) if isinstance(source, int | np.integer) else os.fspath(source)
     wish = Wish(rate_hz=rate_hz)
@@ -95,22 +97,20 @@ def _yields_pictures(source: Any) -> bool:
     return hasattr(source, "__iter__") or hasattr(source, "__next__")
 
 
-def _own_source(source: Any) -> FrameSource:
-    """Check that a user's class has what a frame source must have, and name what is missing.
+def _own_source(source: Any, rate_hz: float | None) -> CheckedFrames:
+    """Check that a user's class is a frame source, and give its pictures times if it has none.
 
     Raises
     ------
-    ArgumentTypeError
-        The class cannot be iterated, or its description is none.
+    ArgumentError
+        The class cannot be iterated, or its description is wrong.
+    UsageError
+        A rate is given for pictures that have times.
     """
     if not hasattr(source, "__iter__"):
         must = "have a method __iter__ that yields fingervision.Frame or fingervision.LostFrame"
         raise ArgumentTypeError("source", must, f"is {what_it_is(source)} without it")
-    if not isinstance(source.description, Description):
-        must = "have a `description` that is a fingervision.Description"
-        raise ArgumentTypeError("source", must, f"has {what_it_is(source.description)}")
-    found: FrameSource = source
-    return found
+    return CheckedFrames(source, rate_hz)
 
 
 def _recording(opener: Opener, frames: int | None) -> Opener:

@@ -45,7 +45,7 @@ def measure(
     tips: str = "auto",
     roi: Sequence[int] | None = None,
     rate_hz: float | None = None,
-    times_s: Sequence[float] | None = None,
+    times_s: Iterable[float] | None = None,
     drive: "str | os.PathLike[str] | DriveHistory | Any" = None,
     drive_offset_s: float | None = None,
     columns: "str | os.PathLike[str] | None" = None,
@@ -87,8 +87,8 @@ def measure(
         Region of interest: first column, first row, width, height in pixels.
     rate_hz : float or None
         Pictures per second, if the pictures carry no times.
-    times_s : sequence of float or None
-        Time of every picture of an array.
+    times_s : iterable of float or None
+        Time (s) of every picture of an array, or of an iterable of arrays.
     drive : path, DriveHistory, DataFrame or mapping of columns, or None
         The recorded input, `time_s,input_mm[,run][,force_n]`.
     drive_offset_s : float or None

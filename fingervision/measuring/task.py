@@ -165,7 +165,7 @@ def task_for_frames(task: Task, description: Description) -> Task:
     if task.drive is not None and not description.has_times:
         raise UsageError(
             f"--drive needs a recording with times, but {description.name} has none: "
-            "give --rate-hz, or a times.csv beside the images."
+            "give --rate-hz, or a times.csv beside the images (times_s for arrays in Python)."
         )
     check_gauges(task.gauges, width_px, height_px)
     return replace(task, scale=scale_for_frames(task.scale, (width_px, height_px)))

@@ -301,7 +301,8 @@ class Registry(Generic[T]):
         found = watched(f"{path}", origin, lambda: self._parts_of(load_file(path)))
         if not found:
             raise UsageError(
-                f"{path} must hold at least one {self.noun}, but holds none: see `fingervision plugins --help`."
+                f"{path} must hold at least one {self.noun}, but holds none: define one as the manual's "
+                "page `Extend it` shows."
             )
         return found
 

@@ -133,8 +133,8 @@ def watched(who: str, origin: Origin, act: Callable[[], T]) -> T:
         return within(seconds, run)
     except OutOfTimeError:
         raise PluginTimeoutError(
-            f"{who} must be imported within {seconds:g} s, but was still running at this time limit and was stopped: "
-            f"look for an endless loop; {origin.remedy}."
+            f"{who} must be imported and tried within {seconds:g} s, but was still running at this time limit and was "
+            f"stopped: look for an endless loop at its top or in its functions; {origin.remedy}."
         ) from None
     except PluginError:
         raise

@@ -7,13 +7,11 @@ import numpy as np
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.domain.effect import DriveEffect, Effect, History, PointEffect
 from fingervision.domain.response import Response
-from fingervision.effects.trial import guarded, try_effect
+from fingervision.effects.trial import ROUNDING_MM, guarded, neutral_values, try_effect
 from fingervision.models.table import TableModel
 from fingervision.plugins.faults import MisfitError
 from fingervision.testing.contract import NotApplicable, hold
 
-ROUNDING_MM = 1e-9
-"""Tolerance for rounding errors of a few operations on numbers of some millimetres."""
 SHOWS = 1e-3
 """Smallest change (mm or N) by which an effect counts as visible at usual parameter values; it is smaller than a good
 camera can detect."""
@@ -39,14 +37,6 @@ def bench() -> History:
         force=True,
         bodies=True,
     )
-
-
-def neutral_values(effect: Effect, history: History) -> dict[str, float]:
-    """Parameter values at which the effect must change nothing; shape parameters get their starting values."""
-    return {
-        p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) if p.neutral is None else p.neutral
-        for p in _searched(effect, history)
-    }
 
 
 def usual_values(effect: Effect, history: History) -> dict[str, float]:
@@ -80,7 +70,7 @@ class EffectContract:
         """At neutral values, or with all values 0, the positions of both fingers are those of the model."""
         bare = self._chain().respond({})
         moved_mm = []
-        neutral = neutral_values(self.effect, bench())
+        neutral = neutral_values(_searched(self.effect, bench()))
         for values in (neutral, dict.fromkeys(neutral, 0.0)):
             moved_mm.append(_moved_mm(self._chain().respond({self.effect.name: values}), bare))
             if moved_mm[-1] <= ROUNDING_MM:

@@ -15,12 +15,14 @@ import bluesky.plans as bp
 from bluesky import RunEngine
 from bluesky.protocols import Flyable, Movable, Readable, Stoppable, Triggerable
 
+import fingervision as fv
 from fingervision.adapters.bluesky import Devices, ThreadStatus, devices
 from fingervision.adapters.bluesky_agent import NextRunAgent, run_steps
 from fingervision.domain.errors import DataError, FingervisionError, LimitError, StateError
 from fingervision.tables.read import read_model
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.simulation.injected_effects import Hidden
+from tests.docs.examples import blocks_of
 
 PLAY_MM, GAIN = 0.12, 7.7
 pytestmark = pytest.mark.filterwarnings("default")  # warnings of bluesky and its libraries
@@ -139,6 +141,23 @@ def test_beyond_the_limits_nothing_moves(made: Devices) -> None:
     assert made.gap is not None
     with pytest.raises(StateError, match="triggered"):
         made.gap.read()
+
+
+def test_a_bed_of_the_interface_gives_the_devices_if_it_runs_in_real_time() -> None:
+    with fv.bed(real_time=True) as bed:
+        assert isinstance(devices(bed).stage, Movable)
+    with fv.bed() as bed, pytest.raises(fv.ArgumentError, match="real_time=True"):
+        devices(bed)
+    with pytest.raises(fv.ArgumentTypeError, match="str"):
+        devices("simulated")
+
+
+@pytest.mark.slow
+def test_the_manuals_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    root = Path(__file__).parents[2]
+    (block,) = (block for block in blocks_of(root / "docs/how_to/bluesky.md", root) if block.language == "python")
+    exec(block.body, {})
+    assert capsys.readouterr().out.count(", ok") == 3
 
 
 def test_a_status_tells_its_failure_and_calls_back_once() -> None:

@@ -349,6 +349,14 @@ def test_a_list_states_options_for_each_recording(copy: Path, run: Run, tmp_path
         folder = tmp_path / "day" / row["result"]
         assert (folder / "gaps.csv").read_bytes() == (tmp_path / out / "gaps.csv").read_bytes()
     assert broken["result"] == ""
+    # What was not measured is listed; the others are diagnosed.
+    (copy / "none.csv").write_text("input_mm,gap_mm\n0,4\n1,12\n")
+    code, _, said = run(
+        "batch", "diagnose", "--list", copy / "runs.csv", "--results", "day", "--jobs", "1", "--out", "why"
+    )
+    assert said.count("must have its gaps") == 1
+    assert "broken.mkv must have its gaps" in said
+    assert len(lines(tmp_path / "why")) == 3
     # A changed cell repeats that recording alone.
     (copy / "runs.csv").write_text("recording,px_per_mm,tips\na/good.mkv,41,\nb/good.mkv,,up\n")
     code, told, _ = run("batch", "measure", "--list", copy / "runs.csv", *ALONE, "--out", "day")

@@ -2,7 +2,9 @@
 
 import pickle
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 import calib
 import fingervision as fv
 from fingervision.rendering import Camera, render, two_fingers
+from fingervision.testing import FrameSourceContract, run
 
 SIZE = (320, 240)
 TABLE = {"input_mm": [-0.5, 2.0], "gap_mm": [0.5, 20.5]}
@@ -79,6 +82,92 @@ def test_a_source_of_ones_own_is_told_what_it_lacks() -> None:
         fv.measure(Undescribed(), px_per_mm=34.0)  # type: ignore[arg-type]
     with pytest.raises(fv.ArgumentError, match="__iter__"):
         fv.measure(NotIterable(), px_per_mm=34.0)  # type: ignore[arg-type]
+
+
+DESCRIBED = fv.Description("mine", "made up", "none", fv.Coding.LOSSLESS, *SIZE, None, True, None)
+EMPTY = np.full(SIZE[::-1], 200, np.uint8)
+
+
+class Own:
+    """A frame source in which one thing may be wrong."""
+
+    def __init__(self, frames: Iterable[object], **described: object) -> None:
+        self.frames, self.closed = frames, 0
+        self.description = replace(DESCRIBED, **described)  # type: ignore[arg-type]
+
+    def __iter__(self) -> Iterator[object]:
+        return iter(self.frames)
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+@pytest.mark.parametrize(
+    ("frames", "described", "fact"),
+    [
+        ([fv.Frame(EMPTY, 0, 1.0), fv.Frame(EMPTY, 1, 0.5)], {}, "0.5 s after 1 s"),
+        ([fv.Frame(EMPTY, 0, 0.0), fv.Frame(EMPTY, 1, 0.0)], {}, "0 s after 0 s"),
+        ([fv.Frame(EMPTY, 0, float("nan"))], {}, "nan"),
+        ([fv.Frame(EMPTY, 0, 0.0), fv.Frame(EMPTY, 2, 1.0)], {}, "index 2"),
+        ([fv.Frame(EMPTY[:100], 0, 0.0)], {}, "320 x 100"),
+        ([fv.Frame(EMPTY, 0, 0.0)], {"width_px": 999}, "999 x 240"),
+        ([fv.Frame(EMPTY, 0, 0.0)], {"has_times": False}, "without times"),
+        ([fv.Frame(EMPTY, 0)], {}, "with times"),
+        ([EMPTY], {}, "ndarray"),
+        ([fv.Frame(EMPTY / 255.0, 0, 0.0)], {}, "float64"),  # type: ignore[arg-type]
+        ([fv.Frame(EMPTY, 0, 0.0, "lossless")], {}, "Coding"),  # type: ignore[arg-type]
+        ([fv.LostFrame(0, 0.0, fv.Status.OK, "fine")], {}, "DAMAGED"),
+        ([fv.Frame(EMPTY, 0, 0.0)], {"height_px": 240.0}, "height_px"),
+        ([fv.Frame(EMPTY, 0, 0.0)], {"coding": "lossless"}, "coding"),
+        ([], {}, "none"),
+    ],
+)
+def test_measure_and_contract_hold_a_source_to_what_it_says(frames: list, described: dict, fact: str) -> None:
+    source = Own(frames, **described)
+    with pytest.raises(fv.ArgumentError) as told:
+        fv.measure(source, px_per_mm=34.0)  # type: ignore[arg-type]
+    kind = SimpleNamespace(accepts=lambda name: name == "it", open_frames=lambda name, wish: source)
+    failed = run(FrameSourceContract, kind=kind, name="it").values()
+    assert fact in str(told.value)
+    assert any(fact in sentence for sentence in failed)
+
+
+def test_a_source_without_times_gets_those_of_the_rate_and_is_closed_after_each_reading() -> None:
+    frames = [fv.Frame(pixels, index) for index, pixels in enumerate(pictures(3))]
+    source = Own([*frames, fv.LostFrame(3, None, fv.Status.DAMAGED, "It was lost.")], has_times=False)
+    measured = fv.measure(source, px_per_mm=34.0, rate_hz=25.0)  # type: ignore[arg-type]
+    assert [row.time_s for row in measured] == pytest.approx([0.0, 0.04, 0.08, 0.12])
+    assert source.closed == 1
+    assert measured.picture(2).shape[:2] == SIZE[::-1]
+    assert source.closed == 2
+    with pytest.raises(fv.UsageError, match="times of its own"):
+        fv.measure(Own([fv.Frame(EMPTY, 0, 0.0)]), px_per_mm=34.0, rate_hz=25.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("is_described", [False, True])
+def test_a_source_may_use_its_array_again_for_the_next_picture(is_described: bool) -> None:
+    array = np.empty(SIZE[::-1], np.uint8)
+
+    def again() -> Iterator[np.ndarray]:
+        for index in range(12):
+            scene = two_fingers(60.0 + 2.0 * index, below_tip_px=10.2, width_px=60.0, frame=SIZE)
+            array[:] = render(scene, Camera(), np.random.default_rng(index))
+            yield array
+
+    source = Own((fv.Frame(each, index) for index, each in enumerate(again())), has_times=False)
+    measured = fv.measure(source if is_described else again(), px_per_mm=34.0)  # type: ignore[arg-type]
+    assert measured.gap_mm == pytest.approx((60.0 + 2.0 * np.arange(12)) / 34.0, abs=0.01)
+
+
+def test_times_are_one_for_each_picture() -> None:
+    stack = list(pictures(3))
+    timed = fv.measure(stack, px_per_mm=34.0, times_s=(0.1 * index for index in range(3)))
+    assert timed.time_s == pytest.approx([0.0, 0.1, 0.2])
+    for count in (2, 4):
+        with pytest.raises(fv.ArgumentError, match="times_s"):
+            fv.measure(iter(stack), px_per_mm=34.0, times_s=range(count))
+    with pytest.raises(fv.ArgumentError, match="description"):
+        fv.measure((fv.Frame(each, 0) for each in stack), px_per_mm=34.0)  # type: ignore[misc]
 
 
 def line(time_s: np.ndarray, input_mm: np.ndarray) -> np.ndarray:
@@ -165,3 +254,5 @@ def test_bars_in_pictures_give_the_scale_in_one_call() -> None:
     assert abs(fit.calibration.px_per_mm - 40.0) < 3.0 * fit.calibration.u_px_per_mm
     with pytest.raises(calib.CalibrationError, match="200x300"):
         calib.scale_from_pictures([known[0], calib.KnownSize("half", "bar", 3.0, 0.001, bar(120.0)[:, 100:300])])
+    with pytest.raises(calib.CalibrationError, match=", 3"):
+        calib.KnownSize("colours", "bar", 3.0, 0.001, np.stack([bar(120.0)] * 3, axis=2))

@@ -11,7 +11,7 @@ import fingervision as fv
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import added_effects, catalogue, withdraw
-from fingervision.plugins.faults import PluginNameError
+from fingervision.plugins.faults import PluginNameError, PluginShapeError
 from fingervision.storage.model_toml import write_model
 
 
@@ -116,6 +116,13 @@ def test_refuses_functions_that_cannot_be_one() -> None:
         def taken(input_mm, history, values):
             """Take a name."""
             return input_mm
+
+    with pytest.raises(PluginShapeError, match=r"0\.1"):
+
+        @fv.effect("drive", size)
+        def never_neutral(input_mm, history, values):
+            """Shift the input even if the shift is 0."""
+            return input_mm + values["x_mm"] + 0.1
 
     with pytest.raises(UnknownNameError):
         fv.effect("drive", size, needs_time=True)

@@ -9,7 +9,7 @@ from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
 from fingervision.domain.errors import FingervisionError, UsageError
-from fingervision.frames.source import open_source
+from fingervision.frames.source import Wish, open_source
 from fingervision.models.kinds import build_model, kinds
 from fingervision.plugins.faults import PluginShapeError
 from fingervision.testbed.bed_factory import open_bed
@@ -191,6 +191,8 @@ def test_an_installed_source_opens_what_it_accepts(tmp_path: Path, monkeypatch: 
     file = tmp_path / "a.ramp"
     file.write_text("a file that a video reader would try")
     assert open_source(str(file)).description.kind == "made up"
+    with pytest.raises(PluginShapeError, match=r"ramps of .* none"):
+        list(open_source("ramps:3", Wish(rate_hz=25.0)))
     with pytest.raises(UsageError, match="greedy"):
         open_source("simulated")
 

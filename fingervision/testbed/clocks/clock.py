@@ -49,7 +49,7 @@ class VirtualClock:
 
     def __init__(self, pace: float = 0.0, begin_s: float = 0.0) -> None:
         self._now_s = begin_s
-        self._pace = pace
+        self.pace = pace
         self._host_began_s: float | None = None
 
     def now_s(self) -> float:
@@ -60,10 +60,10 @@ class VirtualClock:
         """Let virtual time pass until `time_s`."""
         if time_s <= self._now_s:
             return
-        if self._pace > 0.0:
+        if self.pace > 0.0:
             if self._host_began_s is None:
-                self._host_began_s = monotonic() - self._now_s / self._pace
-            left_s = self._host_began_s + time_s / self._pace - monotonic()
+                self._host_began_s = monotonic() - self._now_s / self.pace
+            left_s = self._host_began_s + time_s / self.pace - monotonic()
             # The time is set after the sleep: what another thread reads meanwhile is not ahead of the pace.
             if left_s > 0.0:
                 sleep(left_s)
