@@ -111,6 +111,7 @@ class Line:
 
     def __init__(self, port: Port, words: Words) -> None:
         self._port, self._words, self._settings = port, words, dict(words.settings)
+        self._said = ""  # the last words, which a refusal refers to
         sleep(words.open_s)
         for each in words.opening:
             found = self.do(each, {})
@@ -130,6 +131,7 @@ class Line:
         found = None
         for text in exchange.say:
             self.hear()
+            self._said = filled(text, self._all(values)).strip()
             self.say(text, exchange, values)
             found = None if exchange.reply is None else self._reply(exchange, filled(text, self._all(values)))
         return found
@@ -217,7 +219,8 @@ class Line:
         line = self._port.line(end.encode("latin-1"), within_s).decode("latin-1").removesuffix(end).strip()
         refusal = self._words.refusal
         if line and refusal is not None and (found := refusal.search(line)):
-            raise RefusedError("refused", found[1] if refusal.groups and found[1] else line)
+            code = found[1] if refusal.groups and found[1] else line
+            raise RefusedError("refused", f"{code} (it answered {line!r} to {self._said!r})" if self._said else code)
         return line
 
 

@@ -156,3 +156,8 @@ def test_a_late_answer_is_not_taken_for_that_to_the_next_question() -> None:
     line = Line(LatePort(), Words("late", 9600, {}, "\n", 0.0, None, {}, (), {}))
     line.ask(question)
     assert number_in(line.ask(question), "late") == 3.0
+
+
+def test_a_refusal_says_what_was_said_and_answered(device: Invented, tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match=r"'ERR unknown command' to '1PLACE\?'"):
+        opened(EXAMPLE.replace("POS?", "PLACE?"), device, tmp_path)
