@@ -54,7 +54,7 @@ def error_and_u_px(found: ResponseEstimate, name: str) -> tuple[float, float]:
 @pytest.mark.parametrize("name", ["srgb", "linear"])
 def test_what_jpeg_hides_is_in_the_uncertainty(name: str) -> None:
     """JPEG removes the fine detail of sharp edges, in which tone curves differ, in every block alike."""
-    for seed in (1, 2, 4):
+    for seed in (20, 21, 22):
         camera = learnt_from_profiles(jpeg_profiles(name, seed, 85), ASSUMED_CAMERA, Coding.INTRAFRAME)
         error_px, u_px = error_and_u_px(camera.response, name)
         assert abs(error_px) < 2.0 * u_px + 1e-6
