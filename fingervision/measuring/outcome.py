@@ -2,12 +2,10 @@
 
 from collections.abc import Set
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError
 from fingervision.domain.status import Status
 from fingervision.measuring.drive_clock import clock_of, refusal, sentence
@@ -16,28 +14,8 @@ from fingervision.measuring.frame_loop import Prepared
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.summary import summarise
 from fingervision.measuring.task import Task, in_words
-from fingervision.measuring.words import COVERAGE_FACTOR
 from fingervision.motion.clock.clock_offset import ClockOffset, NoClockOffset
-from fingervision.motion.corners import corners
 from fingervision.motion.drive_at import within_jump
-from fingervision.motion.encoder import input_sigma
-
-# Reversals of the stage between two rows of a log, which the interpolated input cuts off.
-
-
-def unseen_turns(drive: DriveHistory) -> tuple[int, float]:
-    """Number of turning points between two rows of the log, and their largest distance from the rows' line (mm)."""
-    runs = [slice(0, drive.input_mm.size)]
-    if drive.run is not None:
-        ends = [0, *(1 + np.flatnonzero(np.array(drive.run[1:]) != np.array(drive.run[:-1]))), len(drive.run)]
-        runs = [slice(begin, end) for begin, end in pairwise(ends)]
-    sigma_mm, _ = input_sigma(drive.input_mm, tuple(runs), drive.time_s)
-    found = corners(drive.input_mm, drive.time_s, tuple(runs), sigma_mm)
-    points = [corner.points(corner.short_by[0])[0] for corner in found if corner.least_mm is not None]
-    lines_mm = np.interp([at_s for at_s, _ in points], drive.time_s, drive.input_mm)
-    beyond = [abs(at_mm - line_mm) for (_, at_mm), line_mm in zip(points, lines_mm, strict=True)]
-    return len(points), float(max(beyond, default=0.0))
-
 
 Clock = ClockOffset | NoClockOffset | None
 
@@ -64,7 +42,7 @@ def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, co
 
 
 def _on_the_log(task: Task, series: GapSeries, clock: Clock) -> list[str]:
-    """Sentences on frames whose input the drive's log does not show, or shows too small."""
+    """Sentences on frames whose input the drive's log does not show."""
     notes = []
     unknown = _within_jumps(task, series, clock)
     if unknown:
@@ -76,17 +54,6 @@ def _on_the_log(task: Task, series: GapSeries, clock: Clock) -> list[str]:
         notes.append(
             f"The drive's log has rows only where the position changes: in {task.drive_rests} rest"
             f"{'s' * (task.drive_rests > 1)}, the stage is taken to stand until shortly before the next row."
-        )
-    if task.drive is None or not series.gap_mm.size:
-        return notes
-    turned, missed_mm = unseen_turns(task.drive)
-    gap_per_input = float(np.ptp(series.gap_mm)) / max(float(np.ptp(task.drive.input_mm)), 1e-12)
-    # The error of the input is of interest once it moves the gap visibly.
-    if turned and gap_per_input * missed_mm > COVERAGE_FACTOR * float(np.median(series.u_random_mm)):
-        notes.append(
-            f"The stage turned between two rows of the drive's log ({turned} time{'s' * (turned > 1)}), up to "
-            f"{1e3 * missed_mm:.2g} um beyond the line between them; the input of the frames is interpolated linearly "
-            "and is too small there. Log the drive several times as fast as the camera."
         )
     return notes
 

@@ -252,7 +252,9 @@ def corners(input_mm: Array, time_s: Array, runs: tuple[slice, ...], sigma_mm: f
         u, t = input_mm[run], time_s[run]
         if u.size < 2 * STENCIL:
             continue
-        rows = _Rows(u, t, LONGEST_GAP * float(np.median(np.diff(t))), sigma_mm, run.start)
+        # Rows of a stage at rest, interpolated in a log, differ by the rounding of floating-point numbers.
+        known_mm = max(sigma_mm, float(np.spacing(np.max(np.abs(u)))))
+        rows = _Rows(u, t, LONGEST_GAP * float(np.median(np.diff(t))), known_mm, run.start)
         for corner in (*rows.starts_and_stops(), *rows.reversals()):
             found[corner.after] = corner
     return at_common_places(sorted(found.values(), key=lambda corner: corner.after), SURELY * sigma_mm)

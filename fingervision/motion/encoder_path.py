@@ -246,16 +246,14 @@ def piece(
     second = np.abs(second_signed)
     fourth = np.abs(np.pad(differences(input_mm, time_s, 4), 2, mode="edge"))
     between = CORNER * np.minimum(fourth[:-1] + fourth[1:], 3.0 * np.minimum(second[:-1], second[1:]))
-    found = _corners(time_s, input_mm, second, u_mm)
+    found = corners_between_rows(time_s, input_mm, u_mm)
     at_s = np.array([one.at_s for one in found])
     fine_s = _points(time_s, at_s)
     interval = np.clip(np.searchsorted(time_s, fine_s, side="right") - 1, 0, time_s.size - 2)
     fine_mm = _curve(time_s, input_mm, fine_s, interval)
     for one in found:
         inside = (fine_s >= time_s[one.first]) & (fine_s <= time_s[one.last])
-        fine_mm[inside] = one.at_mm + np.where(fine_s < one.at_s, one.before, one.after)[inside] * (
-            fine_s[inside] - one.at_s
-        )
+        fine_mm[inside] = one.input_mm(fine_s[inside])
         between[one.first : one.last] = one.u_mm
     errors = np.hypot(between[interval], np.interp(fine_s, time_s, u_mm))
     share = (fine_s - time_s[interval]) / np.diff(time_s)[interval]
@@ -299,9 +297,20 @@ class Corner:
     after: float
     u_mm: float
 
+    def input_mm(self, time_s: Array) -> Array:
+        """Position on the two lines (mm); shape (n,)."""
+        return np.asarray(self.at_mm + np.where(time_s < self.at_s, self.before, self.after) * (time_s - self.at_s))
 
-def _corners(time_s: Array, input_mm: Array, second: Array, u_mm: Array) -> list[Corner]:
-    """Find corners of the path without a row in them: a reversal lies between two rows."""
+
+def corners_between_rows(time_s: Array, input_mm: Array, u_mm: Array) -> list[Corner]:
+    """Find corners of the path without a row in them: a reversal lies between two rows.
+
+    Parameters
+    ----------
+    time_s, input_mm, u_mm : ndarray of float, shape (n,)
+        Times, inputs and their standard uncertainties, of at least `FEWEST` rows of one run.
+    """
+    second = np.abs(np.pad(differences(input_mm, time_s, 2), 1, mode="edge"))
     k = np.arange(2, time_s.size - 3)
     bend, beside = second[k] + second[k + 1], second[k - 1] + second[k + 2]
     speed = np.diff(input_mm) / np.diff(time_s)

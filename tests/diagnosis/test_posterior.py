@@ -6,12 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fingervision as fv
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.record_errors import simulated_errors, with_record_errors
 from fingervision.diagnosis.input.preparation import prepare
+from fingervision.domain.drive import DriveHistory
 from fingervision.effects.play_operator import play
+from fingervision.interface.column_tables import measured_from_columns
+from fingervision.motion.clock.alignment import find_clock_offset
+from fingervision.motion.clock.clock_offset import ClockOffset
+from fingervision.motion.drive_at import drive_at
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 
@@ -93,3 +99,39 @@ def test_stick_slip_alone_behind_a_noisy_record_keeps_its_covariance(tmp_path: P
     # The prediction depends on it discontinuously, so that no derivative gives the contribution of the record.
     errors_mm = list(simulated_errors(data, np.random.default_rng(SEED)))
     np.testing.assert_array_equal(with_record_errors(problem, best, errors_mm).covariance, best.covariance)
+
+
+@pytest.mark.parametrize("behind", [True, False], ids=["wrong slope behind the play", "wrong scale before it"])
+def test_a_play_beside_a_wrong_gain_is_as_uncertain_as_its_place_in_the_chain(behind: bool) -> None:
+    # 2 % of the play lie between both: the table cannot tell a lever's error from a scale's.
+    time_s = np.arange(0.0, 24.0, 0.04)
+    stands_mm = 0.5 + 0.5 * np.interp(time_s % 12.0, [0.0, 6.0, 12.0], [-1.0, 1.0, -1.0])
+    read_mm = stands_mm if behind else stands_mm / 1.02
+    gap_mm = 1.2 + 7.72 * (1.02 if behind else 1.0) * play(stands_mm, 0.05, 0.3)
+    gap_mm += np.random.default_rng(8).normal(0.0, 5e-4, gap_mm.size)
+    columns = {"time_s": time_s.tolist(), "input_mm": read_mm.tolist(), "gap_mm": gap_mm.tolist()}
+    found = fv.diagnose(measured_from_columns(columns), {"input_mm": [-0.5, 1.5], "gap_mm": [-2.66, 12.78]}).report
+    assert {len(names) for names in found.alternatives} == {2}
+    width = next(effect for effect in found.effects if effect.name == "backlash").parameters["play_mm"]
+    assert abs(width.value - 0.05) < 2.0 * width.u < 0.004
+
+
+def test_a_play_beside_a_clock_found_from_the_same_motion_is_within_its_uncertainty() -> None:
+    rng = np.random.default_rng(5)
+    corner_s, corner_mm = (0.0, 1.0, 2.871, 4.403, 6.127, 7.127, 8.0), (0.0, 0.0, 0.6559, 0.1048, 0.4936, 0.4936, 0.2)
+    fine_s = np.arange(0.0, 8.0, 5e-4)
+    moved_mm = play(np.interp(fine_s, corner_s, corner_mm), 0.066, -0.4)
+    frame_s, row_s = np.arange(0.007, 8.0, 0.02), np.arange(0.0, 8.0, 0.02)
+    gap_mm = 1.2 + 7.72 * np.interp(frame_s, fine_s, moved_mm) + rng.normal(0.0, 5e-4, frame_s.size)
+    log, film_s = DriveHistory(row_s, np.interp(row_s, corner_s, corner_mm)), np.round(frame_s + 3.2, 3)
+    clock = find_clock_offset(film_s, gap_mm, log)
+    assert isinstance(clock, ClockOffset)
+    states = [drive_at(log, clock.log_time_s(at)) for at in film_s]
+    rows = [(at, state.input_mm, gap) for at, state, gap in zip(film_s, states, gap_mm, strict=True) if state]
+    columns = dict(zip(("time_s", "input_mm", "gap_mm"), np.array(rows).T.tolist(), strict=True))
+    table = replace(measured_from_columns(columns), u_clock_s=clock.u_time_s, stamp_s=1e-3)
+    found = fv.diagnose(table, {"input_mm": [-0.5, 1.5], "gap_mm": [-2.66, 12.78]}).report
+    assert [effect.name for effect in found.effects] == ["backlash"]
+    width = found.effects[0].parameters["play_mm"]
+    assert abs(width.value - 0.066) < 2.0 * width.u < 0.002
+    assert found.disagreement.after_rms_mm < 2.0 * 5e-4

@@ -161,3 +161,11 @@ def test_a_play_as_small_as_the_motion_between_two_rows_is_no_delay(tmp_path: Pa
     assert [effect.name for effect in report.effects] == ["backlash"]
     play = report.effects[0].parameters["play_mm"]
     assert play.value == pytest.approx(play_mm, abs=3.0 * (play.u or 0.0))
+
+
+def test_a_rest_that_is_interpolated_in_a_log_is_no_reversal() -> None:
+    t = np.round(np.arange(60) / 30.0, 3)
+    u = np.interp(t, [0.0, 1.02, 2.0], [0.0, 0.6, 0.6])
+    first = int(np.flatnonzero(u == 0.6)[0])
+    u[first + 1] = np.nextafter(0.6, 1.0)
+    assert not reversals(u, t, 0.0)

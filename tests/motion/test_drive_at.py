@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.measuring.outcome import unseen_turns
 from fingervision.motion.drive_at import drive_at, within_jump
 
 # Rounding of a weighted mean of two doubles.
@@ -60,16 +59,6 @@ def test_a_ramp_between_corners_and_an_encoder_step_are_no_jumps() -> None:
     assert all(drive_at(encoder, at) is not None for at in encoder.time_s[:-1] + 0.1)
 
 
-def test_turns_between_the_rows_of_a_log_are_counted_with_their_distance() -> None:
-    time_s = np.arange(0.0, 20.0, 0.1) + 0.03
-    strokes = 2.0 * np.abs((time_s / 4.0) % 1.0 * 2.0 - 1.0)
-    turned, missed_mm = unseen_turns(DriveHistory(time_s, strokes))
-    assert turned == 9
-    assert missed_mm == pytest.approx(0.042, abs=0.002)
-    corners = DriveHistory(np.arange(0.0, 20.0, 0.1), 2.0 * np.abs((np.arange(0.0, 20.0, 0.1) / 4.0) % 1.0 * 2.0 - 1.0))
-    assert unseen_turns(corners) == (0, 0.0)
-
-
 def test_a_motion_that_bends_between_the_rows_is_followed_by_a_curve() -> None:
     def motion(time_s: np.ndarray) -> np.ndarray:
         return np.asarray(0.2 * np.sin(2.0 * np.pi * 5.0 * time_s))
@@ -99,3 +88,18 @@ def test_strokes_corners_and_steps_of_an_encoder_stay_linear(input_mm: np.ndarra
         state = drive_at(log, float(at))
         if state is not None:
             assert state.input_mm == pytest.approx(float(np.interp(at, log.time_s, input_mm)), abs=1e-12)
+
+
+def test_a_stage_that_turns_between_two_rows_is_followed_to_its_turning_point() -> None:
+    def strokes(time_s: np.ndarray) -> np.ndarray:
+        return 0.3 * np.abs((time_s / 1.0069) % 2.0 - 1.0)
+
+    rows_s = np.arange(0.0, 6.0, 0.02)
+    exact, noisy = strokes(rows_s), strokes(rows_s) + np.random.default_rng(3).normal(0.0, 1e-4, rows_s.size)
+    turns_s = 1.0069 * np.arange(1.0, 5.0)
+    for input_mm, within_mm in ((exact, 1e-9), (noisy, 5e-4)):
+        log = DriveHistory(rows_s, input_mm)
+        followed = [drive_at(log, at).input_mm for at in turns_s]  # type: ignore[union-attr]
+        assert followed == pytest.approx(strokes(turns_s), abs=within_mm)
+    # The chord between the rows misses the turning point by more.
+    assert np.max(np.abs(np.interp(turns_s, rows_s, exact) - strokes(turns_s))) > 2e-3

@@ -12,6 +12,7 @@ from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.position_map import (
     NAME,
 )
+from fingervision.diagnosis.inference.posterior import beside_alternatives
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.random_effect_search import beside_gains, beside_map
 from fingervision.diagnosis.inference.record_errors import settled_with_records
@@ -170,7 +171,7 @@ def _settled(state: Searched, look: Look) -> Refitted:
     if not look.forced & set(found.best.names):
         found = needed(data, found)
     best, posterior = settled_with_records(data, found.problem, found.best, look.rng)
-    found = found.with_best(best)
+    found = found.with_best(beside_alternatives(found.problem, best, found.alternatives))
     if data.position_map is not None:
         data = replace(
             data, position_map=data.position_map.refitted(found.problem, best, data.behind(data.position_map))

@@ -14,7 +14,7 @@ from fingervision.diagnosis.inference.random_effect import estimated_coefficient
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.search import search
 from fingervision.diagnosis.inference.search_state import Findings
-from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.observations import PATH, Observations
 from fingervision.domain.effect import Flags
 
 QUIET = 3.0 * 2.0**0.5
@@ -32,14 +32,13 @@ def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     values, free = explanation.values, explanation.free
     residual_mm = data.stacked_mm - data.chain.stacked(values)
     problem = data.problem(residual_mm, free, explained=True, values=values)
-    turning = data.turning
-    if turning is None:
+    columns_mm = data.path_errors_mm(values)
+    if not columns_mm.shape[1]:
         return problem
-    # What the errors at the reversals explain is no noise of the picture.
+    # What the errors of the path explain is no noise of the picture.
     left = problem.measured - problem.whitened(values)
     beside = replace(explanation, residual=left, sigma_mm=problem.offsets.spread(left)[0])
-    columns_mm = turning.columns_mm(data.chain, values)
-    errors, _ = estimated_coefficients(problem, beside, columns_mm.shape[1], data.behind(turning))
+    errors, _ = estimated_coefficients(problem, beside, columns_mm.shape[1], data.behind(PATH))
     return data.problem(residual_mm - columns_mm @ errors, free, explained=True, values=values)
 
 

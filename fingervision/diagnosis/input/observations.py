@@ -13,7 +13,7 @@ from fingervision.diagnosis.inference.position_map import PositionMap
 from fingervision.diagnosis.inference.random_effect import RunGains
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.input.driven_model import with_dynamics
-from fingervision.diagnosis.input.record_nuisances import TurningErrors
+from fingervision.diagnosis.input.record_nuisances import TurningErrors, clock_columns
 from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
 from fingervision.diagnosis.noise.noise_model import Noise, gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
@@ -80,6 +80,8 @@ SEEN_STAMPS = 0.3
 noise: it then changes a variance by less than a tenth."""
 SHORT = 100
 """Number of samples below which no row is excluded before an effect is found."""
+PATH = "path"
+"""Name of the random effect of the errors of the path (`Observations.path_errors_mm`)."""
 NOTHING: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 """The model without effects."""
 SMALL_TURN = 0.02
@@ -142,7 +144,6 @@ class Observations:
     run_gains: RunGains | None = None
     roundings: PositionMap | None = None
     runs_scatter_mm: float = np.inf
-    clock: Array | None = None
     function: FunctionModel | None = None
     turning: TurningErrors | None = None
     turns: UnseenTurns = NO_TURNS
@@ -169,14 +170,17 @@ class Observations:
     def random_effects_mm(self, values: Mapping[str, Mapping[str, float]]) -> tuple[tuple[object, Array], ...]:
         """Random effects beside an explanation, each with its columns, in the order used by a problem."""
         own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains, self.roundings) if one]
-        turning: list[tuple[object, Array]] = (
-            [] if self.turning is None else [(self.turning, self.turning.columns_mm(self.chain, values))]
-        )
-        if self.turns.random and self.turns.uncertain:
-            turning.append((self.turns, self.turn_columns_mm(values) * self.turns.sigmas))
-        clock = [] if self.clock is None or not self.clock.shape[1] else [("clock", self.clock)]
         drawing = [("drawing", self.refit.columns)] if self.refit.moved else []
-        return (*own, *turning, *clock, *drawing)
+        return (*own, (PATH, self.path_errors_mm(values)), *drawing)
+
+    def path_errors_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
+        """Change of the prediction per standard uncertainty of reversals, turning points and clock; shape (m, k)."""
+        parts = [clock_columns(self.chain, self.table.u_clock_s, values)]
+        if self.turning is not None:
+            parts.append(self.turning.columns_mm(self.chain, values))
+        if self.turns.random:
+            parts.append(self.turn_columns_mm(values) * self.turns.sigmas)
+        return np.hstack(parts)
 
     def behind(self, effect: object) -> int:
         """Number of columns that follow the columns of a given random effect in the problem."""
@@ -238,8 +242,8 @@ class Observations:
         stamps = self.recorded.stamps_mm
         if stamps is not None and np.any(stamps > SEEN_STAMPS * noises[0].total_mm):
             passing = np.hypot(passing, stamps)
-        beside = [columns for _, columns in self.random_effects_mm(values)]
-        drawing = np.hstack(beside) if beside else None
+        beside = np.hstack([columns for _, columns in self.random_effects_mm(values)])
+        drawing = beside if beside.shape[1] else None
         whitener = Whitener(
             history,
             noises,

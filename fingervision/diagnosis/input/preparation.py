@@ -11,7 +11,7 @@ from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import DrawingRefit, tangent
 from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynamics
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.input.record_nuisances import TurningErrors, clock_columns
+from fingervision.diagnosis.input.record_nuisances import TurningErrors
 from fingervision.diagnosis.noise.replicates import FEWEST_DEGREES, repeats_in, visits
 from fingervision.domain.effect import REZEROED, Array, History
 from fingervision.domain.errors import DataError
@@ -109,7 +109,6 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         (*table.notes, *_notes_on_input(table, recorded), *screened, *_notes_on_clock(table)),
         refit,
         _visits(table),
-        clock=clock_columns(chain, table.u_clock_s),
         function=function,
         turning=TurningErrors.of(history),
         turns=turns,

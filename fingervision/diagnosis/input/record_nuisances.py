@@ -40,7 +40,7 @@ with u the data would count twice, and the uncertainty of a play that is correla
 understated."""
 
 
-def clock_columns(chain: MeasuringChain, u_clock_s: float) -> Array:
+def clock_columns(chain: MeasuringChain, u_clock_s: float, values: Mapping[str, Mapping[str, float]]) -> Array:
     """Change of the stacked prediction per standard deviation of the clock offset's prior; shape (m, 1), or (m, 0).
 
     Parameters
@@ -49,23 +49,26 @@ def clock_columns(chain: MeasuringChain, u_clock_s: float) -> Array:
         Model with the recorded input.
     u_clock_s : float
         Standard uncertainty of the offset; 0 if both have the same clock.
+    values : mapping
+        Effects found so far. A later clock delays the prediction with all effects: while a play is taken up, the gap
+        is constant, and does not depend on the offset.
     """
     history = chain.history
     if u_clock_s == 0.0 or history.time_s is None:
         return np.zeros((chain.stacked({}).size, 0))
     # Step of the difference: the offset's uncertainty, but at most half a sample, over which the record is straight.
     step_s = min(u_clock_s, 0.5 * history.sample_time_s)
-    ends = [chain.with_input(_moved(chain, by_s)).stacked({}) for by_s in (-step_s, step_s)]
-    return np.asarray((ends[1] - ends[0]) * (FREEDOM * u_clock_s / (2.0 * step_s)))[:, None]
+    predicted = chain.stacked(values).reshape(-1, history.input_mm.size)
+    change = [_moved(history, one, step_s) - _moved(history, one, -step_s) for one in predicted]
+    return np.asarray(np.concatenate(change) * (FREEDOM * u_clock_s / (2.0 * step_s)))[:, None]
 
 
-def _moved(chain: MeasuringChain, by_s: float) -> Array:
-    """Delay the recorded input by `by_s`, run by run."""
-    history = chain.history
-    out = np.empty_like(history.input_mm)
+def _moved(history: History, values: Array, by_s: float) -> Array:
+    """Values of each run at times later by `by_s`; shape (n,)."""
+    out = np.empty_like(values)
     for run in history.runs:
         time_s = history.times[run]
-        out[run] = np.interp(time_s + by_s, time_s, history.input_mm[run])
+        out[run] = np.interp(time_s + by_s, time_s, values[run])
     return out
 
 
