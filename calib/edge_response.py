@@ -18,16 +18,18 @@ remains of each frequency is therefore unknown, as the optics are.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.special import erfcx, ndtr
+from scipy.stats import chi2
 
 from calib.camera_response import CURVES, CameraResponse, standard_response
 from calib.edge_profile import EdgeProfile
+from calib.edge_scene import NOTHING, PROBE, SCENES, Scene
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +39,8 @@ LEVELS = np.linspace(0.0, 1.0, 1025)
 # tails' mean length over sigma (about 0), change of the light of each plateau per pixel (share of the contrast),
 # difference of an edge's ln sigma from the common one, ln sigma.
 U_DISC, U_TAIL, U_LENGTH, U_SLOPE, U_UNLIKE, U_SIGMA = 1.0, 0.2, 0.5, 0.01, 0.03, 1.0
+# Standard deviation of the difference of an edge's ln sigma from that of the same finger's other edge.
+U_UNLIKE_INSIDE = 0.01
 # Radius of the disc over sigma where a fit begins, and width of the edge over sigma with this disc: from a disc the fit
 # finds both defocus and sharp optics, but not the other way round.
 START_DISC = 1.6
@@ -50,6 +54,18 @@ LEAST_PROBABILITY, CERTAIN = 1e-3, 0.99
 REACH_SIGMAS, REACH_EXTRA_PX = 4.0, 3.0
 # Steps of the Levenberg-Marquardt fit, change of the cost below which it has converged, and step of the derivatives.
 MOST_STEPS, CONVERGED, STEP = 25, 0.02, 1e-4
+# Steps after which the best of several starts is chosen.
+FIRST_STEPS = 7
+# Difference in log evidence beyond which a scene is not tried with further tone curves, which gain less than this.
+HOPELESS = 20.0
+# Difference of the blurs of inner and outer edges (ln sigma) above which a wall narrower than the blur is possible: it
+# is four times the precision of recordings without a wall.
+WIDER_INSIDE = 0.02
+# Rate of false alarms of the score test, and least information of a direction as a share of the largest.
+FALSE_ALARMS, LEAST_TOLD = 1e-3, 1e-3
+# Extent of the table of the edge spread function in the largest length of the optics and in pixels, and its spacing:
+# linear interpolation errs by 1e-4.
+TABLE_SIGMAS, TABLE_EXTRA_PX, TABLED_PX = 5.0, 1.0, 0.05
 # Numbers of unknowns: common to all edges (see `FamilyFit`), and of each edge (position, both plateaus as
 # levels, slopes of both, ln of its own sigma over the common one).
 SHARED, OWN = 5, 6
@@ -128,6 +144,12 @@ class FamilyFit:
         ln length of the tails over sigma; and their standard uncertainties.
     edges : ndarray of float, shape (SHARED + edges * OWN + bands,)
         All unknowns but the parameters of the tone curve; the last are the shares of each frequency that a codec lost.
+    scene : Scene
+        What stands beside the edges.
+    beside : ndarray of float, shape (m,)
+        Parameters of the scene.
+    at_px, at_covariance : ndarray of float, shapes (edges,) and (edges, edges)
+        Positions of the edges, and their covariance with everything else free.
     log_evidence : float
         Logarithm of the evidence, up to a constant.
     misfit : ndarray of float, shape (edges,)
@@ -145,12 +167,23 @@ class FamilyFit:
     log_evidence: float
     misfit: Floats
     rms_level: float
+    scene: Scene = NOTHING
+    beside: Floats = field(default_factory=lambda: np.zeros(0))
+    at_px: Floats = field(default_factory=lambda: np.zeros(0))
+    at_covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
     def response(self, parameters: Floats | None = None) -> CameraResponse:
         """Tone curve of the fit, or of other parameters of its family."""
         if not self.parameters.size:
             return _fixed_response(self.family)
         return _as_response(self.family, self.parameters if parameters is None else parameters)
+
+    def outline_px(self, side: Floats, is_outer: NDArray[np.bool_]) -> Floats:
+        """Distance of the outline of the whole part beyond each edge: the width of a side wall."""
+        if self.scene.name != "wall":
+            return np.zeros(side.size)
+        distances, _ = self.scene.steps(self.beside[None], side, is_outer)
+        return np.asarray(distances[0].max(axis=-1))
 
     def one_sigma(self) -> tuple[CameraResponse, ...]:
         """Tone curves one standard deviation away along each principal axis of the parameters' covariance."""
@@ -192,6 +225,90 @@ def fit_families(
     return sorted(fits, key=lambda fit: -fit.log_evidence)
 
 
+def fit_scenes(
+    profiles: Sequence[EdgeProfile],
+    discrepancy: float,
+    families: Sequence[Family],
+    others: Sequence[Family] = (),
+) -> list[FamilyFit]:
+    """Fit everything that may stand beside the edges, the most probable first.
+
+    Parameters
+    ----------
+    profiles : sequence of EdgeProfile
+        Profiles of dark fingers, at least one of an inner and one of an outer flank.
+    discrepancy : float
+        Standard deviation of a real edge about the best model, smooth over a pixel, as a share of the contrast.
+    families : sequence of Family
+        Families of tone curves that are fitted with every scene.
+    others : sequence of Family
+        Families that are fitted with nothing beside the edges, and with the two most probable scenes.
+    """
+    data = _Data.of(profiles, 0.0, 1.0, (), np.inf).with_discrepancy(discrepancy)
+    coarse = _Data.of([_thinned(profile) for profile in profiles], 0.0, 1.0, (), np.inf).with_discrepancy(discrepancy)
+    narrowest = min(_width(profile) for profile in profiles)
+    fits = [_fit(family, data, data.start()) for family in families]
+    for scene in SCENES:
+        begun = []
+        for own, inner_px, outer_px in scene.starts:
+            start = data.start()
+            start[0] = np.log(narrowest / START_WIDENED)
+            start[SHARED : SHARED + OWN * len(profiles) : OWN] = np.where(data.is_outer, outer_px, inner_px)
+            begin = np.array(families[0].mean), np.array(own)
+            begun.append(_fit(families[0], coarse, start, scene, begin, FIRST_STEPS))
+        best = max(begun, key=lambda fit: fit.log_evidence)
+        for family in families:
+            parameters = best.parameters if family is families[0] else np.array(family.mean)
+            best = _fit(family, data, best.edges, scene, (parameters, best.beside))
+            fits.append(best)
+    least = max(fit.log_evidence for fit in fits) - HOPELESS
+    begun = [fit for fit in fits if fit.family is families[0] and (fit.scene is NOTHING or fit.log_evidence > least)]
+    for fit in begun:
+        start = fit.edges
+        fits += [_fit(family, data, start, fit.scene, (np.array(family.mean), fit.beside)) for family in others]
+    return sorted(fits, key=lambda fit: -fit.log_evidence)
+
+
+def _thinned(profile: EdgeProfile) -> EdgeProfile:
+    """Profile with every third bin, from which a fit may begin."""
+    away, level, u = (each[1::3] for each in (profile.away_px, profile.level, profile.u_level))
+    return replace(profile, away_px=away, level=level, u_level=u)
+
+
+def fixed_family(response: CameraResponse) -> Family:
+    """Family of one known curve."""
+    light = _light(response)
+    return Family(response.name, lambda _: light)
+
+
+def family(name: str) -> Family:
+    """Family of this name."""
+    return next(each for each in FAMILIES if each.name == name)
+
+
+def is_more_beside(profiles: Sequence[EdgeProfile], model_error: float, family: Family) -> bool:
+    """Whether steps of light beside the edges would explain what the fit of a family leaves (score test)."""
+    data = _Data.of(profiles, model_error, 1.0, (), np.inf)
+    fit = _fit(family, data, data.start())
+    wider = fit.edges[SHARED + OWN - 1 : SHARED + OWN * len(profiles) : OWN]
+    if abs(float(wider[~data.is_outer].mean() - wider[data.is_outer].mean())) > WIDER_INSIDE:
+        return True
+    unknowns = np.concatenate([fit.parameters, np.zeros(len(PROBE.mean)), fit.edges])
+    residual = _residuals(fit.family, PROBE, data, unknowns[None])[0]
+    jacobian = _jacobian(fit.family, PROBE, data, unknowns, residual)
+    k, probes = len(fit.parameters), len(PROBE.mean)
+    tried, own = jacobian[:, k : k + probes], np.delete(jacobian, np.s_[k : k + probes], axis=1)
+    _, u = _priors(fit.family, NOTHING, data)
+    hessian = own.T @ own + _precision(u, data)
+    tried = tried / np.linalg.norm(tried, axis=0)
+    mixed = own.T @ tried
+    information = tried.T @ tried - mixed.T @ np.linalg.solve(hessian, mixed)
+    variance, axes = np.linalg.eigh(information)
+    is_told = variance > LEAST_TOLD * variance[-1]
+    score = (axes.T @ (tried.T @ residual))[is_told] / np.sqrt(variance[is_told])
+    return bool(score @ score > chi2.isf(FALSE_ALARMS, np.count_nonzero(is_told)))
+
+
 @cache
 def _tagged(name: str) -> tuple[Family, ...]:
     if not name or any(family.name == name for family in FAMILIES):
@@ -200,9 +317,13 @@ def _tagged(name: str) -> tuple[Family, ...]:
 
 
 def probabilities(fits: Sequence[FamilyFit]) -> Floats:
-    """Posterior probability of each family."""
+    """Posterior probability of each fit."""
+    others = len({fit.family.name for fit in fits} - {"linear"})
     prior = np.array(
-        [LINEAR_PRIOR if fit.family.name == "linear" else (1.0 - LINEAR_PRIOR) / (len(fits) - 1) for fit in fits]
+        [
+            fit.scene.probability * (LINEAR_PRIOR if fit.family.name == "linear" else (1.0 - LINEAR_PRIOR) / others)
+            for fit in fits
+        ]
     )
     evidence = np.array([fit.log_evidence for fit in fits])
     weight = prior * np.exp(evidence - evidence.max())
@@ -228,7 +349,11 @@ class ResponsePosterior:
     @classmethod
     def of(cls, fits: Sequence[FamilyFit]) -> "ResponsePosterior":
         """Average over families, and over the parameters of each."""
-        likely = [(fit, float(p)) for fit, p in zip(fits, probabilities(fits), strict=True) if p > LEAST_PROBABILITY]
+        best: dict[str, tuple[FamilyFit, float]] = {}
+        for fit, p in zip(fits, probabilities(fits), strict=True):
+            chosen, so_far = best.get(fit.family.name, (fit, 0.0))
+            best[fit.family.name] = (fit if fit.log_evidence > chosen.log_evidence else chosen, so_far + float(p))
+        likely = [(fit, p) for fit, p in best.values() if p > LEAST_PROBABILITY]
         first, p_first = max(likely, key=lambda each: each[1])
         if not first.parameters.size and (first.family.name == "linear" or p_first > CERTAIN):
             curve = first.response()
@@ -278,15 +403,24 @@ class _Data:
     u: Floats
     edge: NDArray[np.intp]
     side: Floats
+    is_outer: NDArray[np.bool_]
     ends: Floats
     sigma: float
     bands: Floats
     u_lost: Floats
+    whiten: tuple[Floats, ...] = ()
 
     @classmethod
-    def of(cls, profiles: Sequence[EdgeProfile], model_error: float, scale: float, steps: Sequence[float]) -> "_Data":
+    def of(
+        cls,
+        profiles: Sequence[EdgeProfile],
+        model_error: float,
+        scale: float,
+        steps: Sequence[float],
+        reach: float = 0.0,
+    ) -> "_Data":
         sigma = float(np.median([_width(profile) for profile in profiles]))
-        reach = REACH_SIGMAS * sigma + REACH_EXTRA_PX
+        reach = reach or REACH_SIGMAS * sigma + REACH_EXTRA_PX
         away, level, u, edge = [], [], [], []
         for k, profile in enumerate(profiles):
             near = np.abs(profile.away_px) < reach
@@ -300,11 +434,23 @@ class _Data:
             np.concatenate(u),
             np.concatenate(edge),
             np.array([profile.side for profile in profiles]),
+            np.array([profile.is_outer for profile in profiles]),
             np.array([profile.ends for profile in profiles]),
             sigma,
             _bands(away, len(steps)),
             _u_lost(sigma, float(np.median([profile.contrast for profile in profiles])), np.array(steps)),
         )
+
+    def with_discrepancy(self, share: float) -> "_Data":
+        """Add what real edges differ from any model: smooth over a pixel, a share of the contrast."""
+        contrast = np.ptp(self.ends, axis=1)
+        whiten = []
+        for e in range(len(self.ends)):
+            mine = self.edge == e
+            apart = self.away[mine][:, None] - self.away[mine]
+            covariance = np.diag(self.u[mine] ** 2) + (share * contrast[e]) ** 2 * np.exp(-0.5 * apart**2)
+            whiten.append(np.linalg.inv(np.linalg.cholesky(covariance)))
+        return replace(self, whiten=tuple(whiten))
 
     def start(self) -> Floats:
         own = np.zeros((len(self.ends), OWN))
@@ -366,24 +512,31 @@ def _width(profile: EdgeProfile) -> float:
     return max(profile.contrast / (ROOT_2PI * max(steepest, 1e-9)), 0.5)
 
 
-def _fit(family: Family, data: _Data, start: Floats) -> FamilyFit:
-    """Levenberg-Marquardt fit, and Laplace's evidence at its result."""
-    k, edges = len(family.mean), len(data.ends)
-    unknowns = np.concatenate([family.mean, start])
-    prior_mean, prior_u = _priors(family, data)
-    precision = np.where(np.isfinite(prior_u), prior_u**-2.0, 0.0)
-    damping, residual = 1e-2, _residuals(family, data, unknowns[None])[0]
+def _fit(
+    family: Family,
+    data: _Data,
+    start: Floats,
+    scene: Scene = NOTHING,
+    begin: tuple[Floats, Floats] | None = None,
+    most_steps: int = MOST_STEPS,
+) -> FamilyFit:
+    """Levenberg-Marquardt fit, and Laplace's evidence at its result; `begin` has both parts' parameters."""
+    k, edges, beside = len(family.mean), len(data.ends), len(scene.mean)
+    curve, own = begin or (np.array(family.mean), np.array(scene.mean))
+    unknowns = np.concatenate([curve, own, start])
+    prior_mean, prior_u = _priors(family, scene, data)
+    precision = _precision(prior_u, data)
+    damping, residual = 1e-2, _residuals(family, scene, data, unknowns[None])[0]
     cost = _cost(residual, unknowns, prior_mean, precision)
-    hessian = np.eye(unknowns.size)
-    for _step in range(MOST_STEPS):
-        jacobian = _jacobian(family, data, unknowns, residual)
-        gradient = jacobian.T @ residual + precision * (unknowns - prior_mean)
-        hessian = jacobian.T @ jacobian + np.diag(precision + 1e-9)
+    for _step in range(most_steps):
+        jacobian = _jacobian(family, scene, data, unknowns, residual)
+        gradient = jacobian.T @ residual + precision @ (unknowns - prior_mean)
+        hessian = jacobian.T @ jacobian + precision
         gained = 0.0
         while damping < 1e6:
             step = np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), -gradient)
             tried = unknowns + step
-            left = _residuals(family, data, tried[None])[0]
+            left = _residuals(family, scene, data, tried[None])[0]
             tried_cost = _cost(left, tried, prior_mean, precision)
             if tried_cost < cost:
                 gained, unknowns, residual, cost = cost - tried_cost, tried, left, tried_cost
@@ -392,39 +545,60 @@ def _fit(family: Family, data: _Data, start: Floats) -> FamilyFit:
             damping *= 10.0
         if gained < CONVERGED:
             break
+    jacobian = _jacobian(family, scene, data, unknowns, residual)
+    hessian = jacobian.T @ jacobian + precision
     covariance = np.asarray(np.linalg.pinv(hessian), dtype=np.float64)
-    evidence = -cost - 0.5 * float(np.linalg.slogdet(hessian)[1]) - float(np.sum(np.log(family.u)))
+    evidence = -cost - 0.5 * float(np.linalg.slogdet(hessian)[1]) - float(np.sum(np.log((*family.u, *scene.u))))
     count = np.bincount(data.edge, minlength=edges)
     chi = np.bincount(data.edge, residual**2, minlength=edges)
+    at = k + beside + SHARED + OWN * np.arange(edges)
     return FamilyFit(
         family,
         unknowns[:k],
         covariance[:k, :k],
-        unknowns[k : k + SHARED],
-        np.sqrt(np.diag(covariance)[k : k + SHARED]),
-        unknowns[k:],
+        unknowns[k + beside : k + beside + SHARED],
+        np.sqrt(np.diag(covariance)[k + beside : k + beside + SHARED]),
+        unknowns[k + beside :],
         evidence,
         chi / np.maximum(count - OWN, 1).astype(np.float64),
         float(np.sqrt(np.mean((residual * data.u) ** 2))),
+        scene,
+        unknowns[k : k + beside],
+        unknowns[at],
+        covariance[np.ix_(at, at)],
     )
 
 
-def _priors(family: Family, data: _Data) -> tuple[Floats, Floats]:
+def _priors(family: Family, scene: Scene, data: _Data) -> tuple[Floats, Floats]:
     """Means and standard deviations of all unknowns; infinite for the position and the plateaus."""
     own = np.array([np.inf, np.inf, np.inf, U_SLOPE, U_SLOPE, U_UNLIKE])
     edges, bands = len(data.ends), len(data.bands)
     shared_u = np.array([U_SIGMA, U_DISC, U_TAIL, U_TAIL, U_LENGTH])
-    mean = np.concatenate([family.mean, [np.log(data.sigma), 0.0, 0.0, 0.0, 0.0], np.zeros(OWN * edges + bands)])
-    return mean, np.concatenate([family.u, shared_u, np.tile(own, edges), data.u_lost])
+    optics = [np.log(data.sigma), 0.0, 0.0, 0.0, 0.0]
+    mean = np.concatenate([family.mean, scene.mean, optics, np.zeros(OWN * edges + bands)])
+    return mean, np.concatenate([family.u, scene.u, shared_u, np.tile(own, edges), data.u_lost])
+
+
+def _precision(u: Floats, data: _Data) -> Floats:
+    """Inverse of the priors' covariance; both edges of a finger lie in one depth and have nearly the same blur."""
+    precision = np.diag(np.where(np.isfinite(u), u**-2.0, 0.0) + 1e-9)
+    if data.whiten:
+        is_left = (data.side > 0.0) != data.is_outer
+        same = U_UNLIKE**2 * (is_left[:, None] == is_left) + U_UNLIKE_INSIDE**2 * np.eye(len(is_left))
+        end = precision.shape[0] - len(data.bands)
+        at = np.arange(end - OWN * len(is_left) + OWN - 1, end, OWN)
+        precision[np.ix_(at, at)] = np.linalg.inv(same)
+    return precision
 
 
 def _cost(residual: Floats, unknowns: Floats, mean: Floats, precision: Floats) -> float:
-    return float(0.5 * (residual @ residual + precision @ (unknowns - mean) ** 2))
+    away = unknowns - mean
+    return float(0.5 * (residual @ residual + away @ precision @ away))
 
 
-def _jacobian(family: Family, data: _Data, unknowns: Floats, residual: Floats) -> Floats:
+def _jacobian(family: Family, scene: Scene, data: _Data, unknowns: Floats, residual: Floats) -> Floats:
     """Derivatives of the residuals; an unknown of one edge moves that edge alone, so that all edges move at once."""
-    common, edges = len(family.mean) + SHARED, len(data.ends)
+    common, edges = len(family.mean) + len(scene.mean) + SHARED, len(data.ends)
     own_end = common + OWN * edges
     moved = np.repeat(unknowns[None], common + OWN + len(data.bands), axis=0)
     moved[np.arange(common), np.arange(common)] += STEP
@@ -432,7 +606,7 @@ def _jacobian(family: Family, data: _Data, unknowns: Floats, residual: Floats) -
         moved[common + j, common + j : own_end : OWN] += STEP
     lost = np.arange(len(data.bands))
     moved[common + OWN + lost, own_end + lost] += STEP
-    change = (_residuals(family, data, moved) - residual) / STEP
+    change = (_residuals(family, scene, data, moved) - residual) / STEP
     jacobian = np.zeros((residual.size, unknowns.size))
     jacobian[:, :common], jacobian[:, own_end:] = change[:common].T, change[common + OWN :].T
     for e in range(edges):
@@ -441,16 +615,22 @@ def _jacobian(family: Family, data: _Data, unknowns: Floats, residual: Floats) -
     return jacobian
 
 
-def _residuals(family: Family, data: _Data, sets: Floats) -> Floats:
+def _residuals(family: Family, scene: Scene, data: _Data, sets: Floats) -> Floats:
     """Measured minus modelled level of every bin, in its standard uncertainties, for each set of unknowns."""
-    k, edges = len(family.mean), len(data.ends)
-    own_end = k + SHARED + OWN * edges
-    own = sets[:, k + SHARED : own_end].reshape(len(sets), edges, OWN)
+    k, beside, edges = len(family.mean), len(scene.mean), len(data.ends)
+    common = k + beside + SHARED
+    own_end = common + OWN * edges
+    own = sets[:, common:own_end].reshape(len(sets), edges, OWN)
     at, dark, light, slope_dark, slope_light, unlike = (own[:, :, j][:, data.edge] for j in range(OWN))
     # The blurred step depends on few unknowns, which most sets of a derivative have in common.
-    blur = np.concatenate((sets[:, k : k + SHARED], own[:, :, 0], own[:, :, 5]), axis=1)
+    blur = np.concatenate((sets[:, k:common], own[:, :, 0], own[:, :, 5]), axis=1)
     _, first, place = np.unique(blur, axis=0, return_index=True, return_inverse=True)
-    step = _step(data.away - at[first], np.exp(unlike[first]), sets[first, k : k + SHARED, None], data.side[data.edge])
+    away, wider, shared = data.away - at[first], np.exp(unlike[first]), sets[first, k + beside : common]
+    if not data.whiten and not beside:
+        step = _step(away, wider, shared[:, :, None], data.side[data.edge])
+    else:
+        distances, weights = scene.steps(sets[first, k : k + beside], data.side, data.is_outer)
+        step = _tabulated_steps(away, wider, shared, distances[:, data.edge], weights[:, data.edge], data)
     x, step = data.away - at, step[place.ravel()]
     share = step + slope_dark * np.minimum(x, 0.0) * (1.0 - step) + slope_light * np.maximum(x, 0.0) * step
     out = np.empty_like(x)
@@ -463,7 +643,35 @@ def _residuals(family: Family, data: _Data, sets: Floats) -> Floats:
     kept = out
     for share, band in zip(sets[:, own_end:].T, data.bands, strict=True):
         kept = kept - share[:, None] * (out @ band.T)
-    return np.asarray((kept - data.level) / data.u)
+    off = kept - data.level
+    if not data.whiten:
+        return np.asarray(off / data.u)
+    ends = np.searchsorted(data.edge, np.arange(1, edges))
+    parts = np.split(off, ends, axis=1)
+    return np.concatenate([part @ own.T for part, own in zip(parts, data.whiten, strict=True)], axis=1)
+
+
+def _tabulated_steps(
+    away: Floats, wider: Floats, shared: Floats, distances: Floats, weights: Floats, data: _Data
+) -> Floats:
+    """Sum of steps at these distances from the edges, by a table of the edge spread function for each set of optics."""
+    every, which = np.unique(shared, axis=0, return_inverse=True)
+    end = TABLE_EXTRA_PX + TABLE_SIGMAS * float(np.exp(every[:, 0].max() + np.maximum(every[:, [1, 4]].max(), 0.0)))
+    x = np.linspace(-end, end, 2 * round(end / TABLED_PX) + 1)
+    one = np.ones((len(every), x.size))
+    tables = _step(x * one, one, every[:, :, None], one)
+    out = np.zeros_like(away)
+    side = data.side[data.edge][:, None]
+    for i, table in enumerate(tables):
+        sets = which.ravel() == i
+        # Widening acts on the optics, and not on the width of the pixel.
+        variance = np.exp(2.0 * every[i, 0]) * (1.0 + 0.25 * np.exp(2.0 * every[i, 1]))
+        narrower = np.sqrt((12.0 * variance + 1.0) / (12.0 * variance * wider[sets] ** 2 + 1.0))
+        places = (away[sets][..., None] - distances[sets]) * narrower[..., None]
+        # An edge that faces the other way sees the tails of the optics swapped.
+        step = 0.5 + side * (np.interp(side * places, x, table) - 0.5)
+        out[sets] = np.sum(weights[sets] * step, axis=-1)
+    return out
 
 
 def _step(x: Floats, wider: Floats, shared: Floats, side: Floats) -> Floats:

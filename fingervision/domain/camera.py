@@ -155,6 +155,36 @@ def assumed_response(name: str) -> ResponseEstimate:
 DISCREPANCY = CameraQuantity(0.003)
 
 
+@dataclass(frozen=True, slots=True)
+class BesideEdges:
+    """What stands beside the edges of both fingers in a whole recording, and how far it displaces the fitted steps.
+
+    Parameters
+    ----------
+    name : str
+        The most probable cause: wall, glare or shadow.
+    probability : float
+        Its probability.
+    inner_px, outer_px : (float, float)
+        Displacement of the left and the right finger's own edge, outwards from the fitted step along its normal.
+    outline_px : (float, float)
+        The same for the inner edges of the whole outline, side walls included.
+    tip_px : (float, float)
+        The same for the tips.
+    u_gap_px, u_outline_px : float
+        Standard uncertainty of the sum of both inner displacements, to the finger's own edge and to the outline.
+    """
+
+    name: str
+    probability: float
+    inner_px: tuple[float, float]
+    outer_px: tuple[float, float]
+    outline_px: tuple[float, float]
+    tip_px: tuple[float, float]
+    u_gap_px: float
+    u_outline_px: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraModel:
     """Everything that is known about a camera; the default is a camera about which nothing is known.
@@ -177,6 +207,8 @@ class CameraModel:
         Whether the defects were looked for.
     discrepancy : CameraQuantity
         Standard deviation of an edge's profile about the best model, as a share of the contrast.
+    beside : BesideEdges or None
+        What stands beside the edges in the whole recording; None if nothing does or it is not known.
     """
 
     response: ResponseEstimate = field(default_factory=lambda: assumed_response("linear"))
@@ -187,6 +219,7 @@ class CameraModel:
     defects: tuple[DefectPixels, ...] = field(default=())
     defects_origin: Origin = Origin.ASSUMED
     discrepancy: CameraQuantity = DISCREPANCY
+    beside: BesideEdges | None = None
 
 
 ASSUMED_CAMERA = CameraModel()

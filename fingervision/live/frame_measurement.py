@@ -46,7 +46,7 @@ class LiveCamera:
 
     def add(self, frame: Frame, settings: Settings, task: Task) -> None:
         """Add a frame with a gap; enough frames start the learning."""
-        if settings.camera.response.is_known or self._camera is not None or self._learning is not None:
+        if self._camera is not None or self._learning is not None:
             return
         self._frames.append(replace(frame, pixels=frame.pixels.copy()))
         if len(self._frames) >= WANTED:

@@ -13,7 +13,8 @@ from fingervision.measuring.scale import Scale
 from fingervision.measuring.temporal_filter import temporal_lag
 from fingervision.vision.flank_profiles import Seen
 from fingervision.vision.grey import to_grey, top_level
-from fingervision.vision.learnt_camera import learnt_camera
+from fingervision.vision.learnt_camera import MODEL_ERROR, learnt_camera
+from fingervision.vision.learnt_scene import learnt_beside
 from fingervision.vision.pipeline import Settings, look_closely, region_of_interest
 
 # Number of frames with a gap from which the camera is learnt: five show all sub-pixel positions of slightly tilted
@@ -45,11 +46,9 @@ def learnt_first(
     frames : iterator of Frame or LostFrame
         All frames in order; an exception of the source is raised after the frames that came before it.
     camera : CameraModel
-        The learnt camera; the camera before if its response is known or too few frames have a gap.
+        The learnt camera, with the response before if that is known; the camera before if too few frames have a gap.
     """
     source = iter(frames)
-    if settings.camera.response.is_known:
-        return source, settings.camera
     kept: list[Frame | LostFrame] = []
     seen: list[Frame] = []
     failed: list[Exception] = []
@@ -75,24 +74,35 @@ def learnt_first(
 
 def camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) -> CameraModel:
     """Camera as frames of one recording show it; the camera before if too few of them have a gap."""
-    seen: list[Seen] = []
-    numbers: list[int] = []
-    coding, top = Coding.LOSSLESS, 0
-    for frame in frames:
-        outcome, fingers, edges = look_closely(frame, settings)
-        if isinstance(outcome, GapMeasurement) and fingers is not None and edges is not None:
-            grey = region_of_interest(to_grey(frame.pixels), settings.region)
-            seen.append((fingers.orientation.view(grey), edges))
-            numbers.append(frame.index)
-            coding, top = frame.coding, max(top, top_level(grey, settings.bits))
     before = settings.camera
-    if len(seen) < FEWEST:
+    looks = [(frame, look) for frame in frames if (look := _steps_alone(frame, settings)) is not None]
+    if len(looks) < FEWEST:
         return before
-    camera = learnt_camera(seen, before, top, coding)
+    seen = [each for _, (each, _) in looks]
+    first, are_dark = looks[0][0], all(is_dark for _, (_, is_dark) in looks)
+    coding, top = first.coding, max(top_level(upright, settings.bits) for upright, _ in seen)
+    camera = learnt_camera(seen, before, top, coding, are_dark=are_dark)
     if coding is not Coding.INTERFRAME:  # such a codec repeats the noise of the picture before
-        lag = temporal_lag([(number, *each) for number, each in zip(numbers, seen, strict=True)])
+        lag = temporal_lag([(frame.index, *each) for frame, (each, _) in looks])
         camera = replace(camera, lag=lag)
-    return replace(camera, response=before.response) if _has_edge_bias(scale) else camera
+    if _has_edge_bias(scale):
+        camera = replace(camera, response=before.response, beside=None)
+    if are_dark and (before.response.is_known or camera.response.curve is not before.response.curve):
+        # The steps of light lie elsewhere under another response.
+        again = replace(settings, camera=camera)
+        seen = [look[0] for frame, _ in looks if (look := _steps_alone(frame, again)) is not None]
+        beside = learnt_beside(seen, camera.response.curve, top, coding, MODEL_ERROR[coding])
+        camera = replace(camera, beside=beside)
+    return camera
+
+
+def _steps_alone(frame: Frame, settings: Settings) -> tuple[Seen, bool] | None:
+    """Picture and fitted steps of a frame with a gap, and whether its fingers are darker than the ground."""
+    outcome, fingers, edges = look_closely(frame, settings, only_steps=True)
+    if not isinstance(outcome, GapMeasurement) or fingers is None or edges is None:
+        return None
+    grey = region_of_interest(to_grey(frame.pixels), settings.region)
+    return (fingers.orientation.view(grey), edges), outcome.light_gap
 
 
 def _has_edge_bias(scale: Scale | None) -> bool:

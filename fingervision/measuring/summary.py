@@ -178,6 +178,7 @@ def _camera(series: GapSeries) -> dict[str, Any]:
             "u": None,
             "origin": camera.defects_origin.value,
         },
+        "beside_edges": None if camera.beside is None else asdict(camera.beside),
     }
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.camera import BesideEdges
 from fingervision.domain.loops import loop
 from fingervision.vision.edge_filters import PIXEL_VARIANCE, Lines, curvature_gain, edge_filters, reach_for
 from fingervision.vision.edge_profile import EdgeMark
@@ -74,6 +75,22 @@ def stated_marks(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMa
     """Edge marks with the given uncertainties, one for each finger."""
     left, right = (EdgeMark(u, mark.beyond) for u, mark in zip(u_px, edges.marks, strict=True))
     return left, right
+
+
+# No displacement: edges stay where steps were fitted.
+STEPS_ALONE = BesideEdges("", 1.0, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), 0.0, 0.0)
+
+
+def moved_by_recording(edges: EdgePoints, beside: BesideEdges, is_outline: bool) -> EdgePoints:
+    """Move the edges along their normal by what the whole recording shows beside them."""
+    inner = np.array(beside.outline_px if is_outline else beside.inner_px)[:, None]
+    outer, tip = np.array(beside.outer_px)[:, None], np.array(beside.tip_px)[:, None]
+    # What all sides have in common acts along the normal; a wall on the gap's side alone lies across the fingers.
+    across = np.where(IS_ROW & ~IS_INNER, outer - tip, (inner - tip) * moved_by_wall(edges))
+    moves = tip * np.hypot(1.0, edges.lines.slope) + across
+    position = edges.position + edges.lines.outward * moves
+    u_px = 0.5 * (beside.u_outline_px if is_outline else beside.u_gap_px)
+    return replace(edges, position=position, marks=stated_marks(edges, [u_px, u_px]), beside=beside.name)
 
 
 # Largest number of rounds in which edge and disturbance are fitted alternately.

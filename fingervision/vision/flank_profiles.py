@@ -21,7 +21,7 @@ STRAIGHT_PX, FEWEST_ROWS = 0.4, 6
 Seen = tuple[GreyImage, EdgePoints]
 
 
-def flank_profiles(seen: Sequence[Seen], top_level: int) -> list[EdgeProfile]:
+def flank_profiles(seen: Sequence[Seen], top_level: int, extra_px: float = REACH_EXTRA_PX) -> list[EdgeProfile]:
     """Profiles of the inner and outer flanks of both fingers, as far as they are straight and in view.
 
     Parameters
@@ -30,19 +30,23 @@ def flank_profiles(seen: Sequence[Seen], top_level: int) -> list[EdgeProfile]:
         Pictures turned so that the tips point up, and the edges fitted in them.
     top_level : int
         Full scale of the pictures.
+    extra_px : float
+        Extent to either side beyond a multiple of the blur (pixels).
     """
     found = (
-        flank_profile(seen, finger, is_inner=is_inner, top_level=top_level)
+        flank_profile(seen, finger, is_inner=is_inner, top_level=top_level, extra_px=extra_px)
         for finger in range(2)
         for is_inner in (True, False)
     )
     return [profile for profile in found if profile is not None]
 
 
-def flank_profile(seen: Sequence[Seen], finger: int, *, is_inner: bool, top_level: int) -> EdgeProfile | None:
+def flank_profile(
+    seen: Sequence[Seen], finger: int, *, is_inner: bool, top_level: int, extra_px: float = REACH_EXTRA_PX
+) -> EdgeProfile | None:
     """Profile of one flank of the left (0) or right (1) finger; None if it is too short, bent, or out of view."""
     part = slice(0, INNER) if is_inner else slice(INNER, ROWS)
-    gathered = [each for upright, edges in seen if (each := _one(upright, edges, finger, part)) is not None]
+    gathered = [each for upright, edges in seen if (each := _one(upright, edges, finger, part, extra_px)) is not None]
     if not gathered:
         return None
     away = np.concatenate([found for found, _ in gathered])
@@ -52,7 +56,9 @@ def flank_profile(seen: Sequence[Seen], finger: int, *, is_inner: bool, top_leve
     return binned_profile(away, level, frame, 1.0 / top_level, outward, is_outer=not is_inner)
 
 
-def _one(upright: GreyImage, edges: EdgePoints, finger: int, part: slice) -> tuple[Floats, Floats] | None:
+def _one(
+    upright: GreyImage, edges: EdgePoints, finger: int, part: slice, extra_px: float
+) -> tuple[Floats, Floats] | None:
     """Distances outwards from the flank's line, and stored levels, of one picture."""
     real = np.flatnonzero(edges.lines.weight[finger, part] > 0)
     rows = real[real.size // 2 :]
@@ -73,7 +79,7 @@ def _one(upright: GreyImage, edges: EdgePoints, finger: int, part: slice) -> tup
     line = at + slope * every
     room = _room_px(upright, edges, line)
     sigma = float(edges.blur_px[finger, 0])
-    reach = int(min(REACH_SIGMAS * sigma + REACH_EXTRA_PX, FARTHEST_PX, room))
+    reach = int(min(REACH_SIGMAS * sigma + extra_px, FARTHEST_PX, room))
     if reach < REACH_SIGMAS * sigma:
         return None
     columns = np.rint(line).astype(int)[:, None] + outward * np.arange(-reach, reach + 1)

@@ -7,7 +7,17 @@ import numpy as np
 
 from calib.camera_response import CURVES, standard_response
 from calib.edge_profile import EdgeProfile
-from calib.edge_response import LINEAR_PRIOR, FamilyFit, ResponsePosterior, fit_families
+from calib.edge_response import (
+    LINEAR_PRIOR,
+    FamilyFit,
+    ResponsePosterior,
+    family,
+    fit_families,
+    fit_scenes,
+    is_more_beside,
+    probabilities,
+)
+from calib.edge_scene import NOTHING
 from fingervision.domain.camera import (
     CameraModel,
     CameraQuantity,
@@ -18,6 +28,7 @@ from fingervision.domain.camera import (
 )
 from fingervision.domain.frame import Coding
 from fingervision.vision.flank_profiles import Seen, flank_profiles
+from fingervision.vision.learnt_scene import BESIDE_PX, DISCREPANCY, SURE, beside_edges, can_tell_beside
 
 # Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
 MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.01}
@@ -59,7 +70,9 @@ MISFIT = (
 )
 
 
-def learnt_camera(seen: Sequence[Seen], prior: CameraModel, top_level: int, coding: Coding) -> CameraModel:
+def learnt_camera(
+    seen: Sequence[Seen], prior: CameraModel, top_level: int, coding: Coding, *, are_dark: bool = False
+) -> CameraModel:
     """Camera with the response and the point spread that straight flanks show.
 
     Parameters
@@ -72,6 +85,8 @@ def learnt_camera(seen: Sequence[Seen], prior: CameraModel, top_level: int, codi
         Full scale of the pictures.
     coding : Coding
         Compression of the pictures.
+    are_dark : bool
+        Whether the fingers are surely darker than the ground, so that what stands beside their edges can be told.
 
     Returns
     -------
@@ -79,11 +94,16 @@ def learnt_camera(seen: Sequence[Seen], prior: CameraModel, top_level: int, codi
         The prior with a learnt response; or with the assumed one and a sentence on why it could not be learnt.
     """
     profiles = [profile for profile in flank_profiles(seen, top_level) if _is_usable(profile)]
-    return learnt_from_profiles(profiles, prior, coding)
+    wide = (
+        [profile for profile in flank_profiles(seen, top_level, BESIDE_PX) if _is_usable(profile)] if are_dark else []
+    )
+    return learnt_from_profiles(profiles, prior, coding, wide)
 
 
-def learnt_from_profiles(profiles: list[EdgeProfile], prior: CameraModel, coding: Coding) -> CameraModel:
-    """Camera as the mean profiles of unclipped flanks show it; see `learnt_camera`."""
+def learnt_from_profiles(
+    profiles: list[EdgeProfile], prior: CameraModel, coding: Coding, wide: Sequence[EdgeProfile] = ()
+) -> CameraModel:
+    """Camera as the mean profiles of unclipped flanks show it, also with more of the ground; see `learnt_camera`."""
     if not profiles:
         return _not_learnt(prior, NO_FLANKS, 1.0 / 3.0)
     overshoot = float(np.median([profile.overshoot for profile in profiles]))
@@ -92,6 +112,8 @@ def learnt_from_profiles(profiles: list[EdgeProfile], prior: CameraModel, coding
         return _not_learnt(prior, SHARPENED.format(share=overshoot), 1.0)
     assumed = prior.response.curve
     fits, misfit = _fitted(profiles, coding, assumed.name if assumed.name in CURVES else "")
+    if beside := _with_scenes(fits, wide, coding):
+        fits, misfit = beside, _misfit(beside)
     if misfit > MOST_MISFIT:
         return _not_learnt(prior, MISFIT.format(misfit=misfit), 1.0)
     best = fits[0]
@@ -103,8 +125,17 @@ def learnt_from_profiles(profiles: list[EdgeProfile], prior: CameraModel, coding
         point_spread=_point_spread(best),
         discrepancy=CameraQuantity(max(misfit, 1.0) * MODEL_ERROR[coding], None, Origin.LEARNT),
     )
-    if prior.response.is_known:
-        return camera
+    if not prior.response.is_known:
+        camera = _with_response(camera, fits, coding)
+    if camera.response.curve is assumed and best.scene is not NOTHING:
+        same = [fit for fit in fits if fit.family.name == assumed.name]
+        camera = replace(camera, beside=beside_edges(same, wide) if same else None)
+    return camera
+
+
+def _with_response(camera: CameraModel, fits: Sequence[FamilyFit], coding: Coding) -> CameraModel:
+    """Camera with the response of the fits."""
+    assumed = camera.response.curve
     if coding is Coding.INTERFRAME:
         # The response stays linear, but another one is as probable (two values, JCGM 100:2008, 4.3.9).
         return _not_learnt(camera, HIDDEN, 1.0 - LINEAR_PRIOR)
@@ -136,6 +167,20 @@ def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[l
         fits = fit_families(profiles, MODEL_ERROR[coding], tagged=tagged, steps=STEPS[coding])
         misfit = _misfit(fits)
     return fits, misfit
+
+
+def _with_scenes(fits: Sequence[FamilyFit], wide: Sequence[EdgeProfile], coding: Coding) -> list[FamilyFit]:
+    """Fits with what may stand beside the edges; empty if they explain no more than tone curves and optics."""
+    # A tone curve with free parameters imitates what stands beside the edges.
+    if not can_tell_beside(wide):
+        return []
+    if not fits[0].parameters.size and not is_more_beside(wide, MODEL_ERROR[coding], fits[0].family):
+        return []
+    always = [family("linear"), family("srgb")]
+    others = [fit.family for fit in fits if fit.family not in always]
+    found = fit_scenes(wide, DISCREPANCY[coding], always, others)
+    bare = sum(float(p) for p, fit in zip(probabilities(found), found, strict=True) if fit.scene is NOTHING)
+    return [] if bare > SURE or _misfit(found) > MOST_MISFIT else found
 
 
 def _misfit(fits: Sequence[FamilyFit]) -> float:

@@ -22,6 +22,7 @@ from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges, local_change
 from fingervision.vision.coded_picture import CodedPicture, coded_picture
+from fingervision.vision.edge_moves import STEPS_ALONE, moved_by_recording
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import LEAST_SURE_PX, TOO_ROUGH, measure_gap
@@ -81,7 +82,7 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
 
 
 def look_closely(
-    frame: Frame, settings: Settings
+    frame: Frame, settings: Settings, *, only_steps: bool = False
 ) -> tuple[GapMeasurement | NoGap, CoarseFingers | None, EdgePoints | None]:
     """Measure one video frame and return the intermediate results, for reports on what limits the measurement.
 
@@ -91,6 +92,8 @@ def look_closely(
         The picture.
     settings : Settings
         Settings of the user.
+    only_steps : bool
+        Whether the edges stay where steps were fitted, whatever stands beside them.
 
     Returns
     -------
@@ -101,6 +104,8 @@ def look_closely(
     edges : EdgePoints or None
         Sub-pixel outlines of the fingers, in pixels of the measured region; None if not measured.
     """
+    if only_steps:
+        settings = replace(settings, camera=replace(settings.camera, beside=STEPS_ALONE))
     attempt = _attempt(
         region_of_interest(to_grey(frame.pixels), settings.region), settings, coded_picture(frame, settings)
     )
@@ -193,7 +198,8 @@ def _attempt(grey: GreyImage, settings: Settings, coded: CodedPicture) -> _Attem
             attempt = _Attempt(fingers, split)
         else:
             attempt = _measured(grey, split, fingers, light_gap, settings, coded, scale)
-            attempt = _with_two_tones(attempt, grey, denoised, light_gap, settings, coded, scale)
+            if settings.camera.beside is None:
+                attempt = _with_two_tones(attempt, grey, denoised, light_gap, settings, coded, scale)
         if isinstance(attempt.outcome, GapMeasurement) or attempt.outcome.status in FINAL:
             return attempt
         first = first or attempt
@@ -240,10 +246,13 @@ def _edges_and_gap(
         return coded.flanks_displaced_px(upright, found, fingers.orientation, light, top)
 
     may_be_sharpened = settings.camera.sharpening.origin is Origin.ASSUMED
-    with suppress(np.linalg.LinAlgError):  # no model describes the structure beside the edges
-        edges = with_profile(
-            upright, edges, light, top, settings.is_outline, displaced_px, may_be_sharpened=may_be_sharpened
-        )
+    if settings.camera.beside is not None:
+        edges = moved_by_recording(edges, settings.camera.beside, settings.is_outline)
+    else:
+        with suppress(np.linalg.LinAlgError):  # no model describes the structure beside the edges
+            edges = with_profile(
+                upright, edges, light, top, settings.is_outline, displaced_px, may_be_sharpened=may_be_sharpened
+            )
     if edges.beside == STRIP:
         return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)

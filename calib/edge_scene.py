@@ -1,0 +1,164 @@
+"""What may stand beside an edge: side wall, bright line or band, shadow. Each adds steps of light to the finger's own.
+
+Light across a finger's edge is a sum of steps, all blurred by the same optics:
+``finger + contrast * sum_i w_i E(x - e_i)``, with e_i the distance outwards from the finger's edge, and weights w_i
+that add up to one between the finger's plateau and that of the ground. A component is such a set of steps with a prior
+of its parameters, which all flanks have in common: what a wall, a shadow or a bright line does on one flank it does, by
+the same law, on the others, and that is how they are told apart.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# Share of a shadow's depth on a flank, as a logit, if light comes from the front.
+ALL_SIDES = 3.0
+# Number of equal steps into which a shadow's light is divided.
+SHADOW_STEPS = 10
+_QUANTILES = (np.arange(SHADOW_STEPS) + 0.5) / SHADOW_STEPS
+
+# Distances outwards and weights of all steps, shapes (sets, edges, steps), from parameters (sets, k), the direction of
+# each edge (+1: the ground has the larger coordinates), and whether it is an outer one.
+Steps = Callable[[Floats, Floats, Bools], tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Something beside the edges, with a Gaussian prior of its parameters.
+
+    Parameters
+    ----------
+    name : str
+        Name, as in `GapMeasurement.beside`; empty for nothing.
+    steps : callable
+        See `Steps`.
+    mean, u : tuple of float
+        Prior means and standard deviations of the parameters.
+    starts : tuple of (tuple of float, float, float)
+        Parameters from which a fit begins, and the positions of inner and of outer edges that go with them (pixels).
+    probability : float
+        Prior probability.
+    """
+
+    name: str
+    steps: Steps
+    mean: tuple[float, ...]
+    u: tuple[float, ...]
+    starts: tuple[tuple[tuple[float, ...], float, float], ...]
+    probability: float
+
+
+def _nothing(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+    shape = (len(p), side.size, 1)
+    return np.zeros(shape), np.ones(shape)
+
+
+def _wall(faces: Callable[[Floats, Bools], Floats]) -> Steps:
+    """Wall on the flanks for which `faces` is not zero, wide by its own parameter on flanks of either direction."""
+
+    def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+        seen = faces(side, is_outer)
+        first = np.where(is_outer, 1, 0) if np.any(seen * is_outer) else np.where(side > 0.0, 0, 1)
+        width = np.exp(p[:, first]) * seen
+        tone = np.broadcast_to(_logistic(p[:, 2:3]), width.shape)
+        return np.stack([np.zeros_like(width), width], -1), np.stack([tone, 1.0 - tone], -1)
+
+    return steps
+
+
+def _line(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+    """Bright line on the finger: how far inside the edge it ends, its breadth, and its light over the contrast."""
+    outer = is_outer.astype(float)
+    near = np.broadcast_to(np.exp(p[:, :1]), (len(p), side.size))
+    far = near + np.exp(p[:, 1:2])
+    light = np.exp(p[:, 2:3] + p[:, 3:4] * outer)
+    edge = np.zeros_like(near)
+    return np.stack([edge, -far, -near], -1), np.stack([edge + 1.0, light, -light], -1)
+
+
+def _band(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+    """Bright band on the finger up to its edge (a chamfer): its breadth, and its light over the contrast as a logit."""
+    breadth = np.broadcast_to(np.exp(p[:, :1]), (len(p), side.size))
+    light = _logistic(p[:, 1:2] + p[:, 2:3] * is_outer)
+    return np.stack([-breadth, np.zeros_like(breadth)], -1), np.stack([light, 1.0 - light], -1)
+
+
+def _shadow(places: Floats) -> Steps:
+    """Shadow on the ground: its light comes back at these places, from some way on; sides may have unlike shares."""
+
+    def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+        length = np.broadcast_to(np.exp(p[:, 1:2]), (len(p), side.size))
+        # Light from the front casts the same shadow on all sides, light from one side none on its own.
+        share = _logistic(ALL_SIDES + side * p[:, 2:3]) / _logistic(np.array(ALL_SIDES))
+        depth = _logistic(p[:, :1]) * share
+        rest_at = np.exp(p[:, 3:4, None]) + length[..., None] * places
+        at = np.concatenate([np.zeros((*length.shape, 1)), rest_at], -1)
+        rest = np.repeat(depth[..., None] / SHADOW_STEPS, SHADOW_STEPS, -1)
+        return at, np.concatenate([1.0 - depth[..., None], rest], -1)
+
+    return steps
+
+
+def _logistic(x: Floats) -> Floats:
+    return np.asarray(1.0 / (1.0 + np.exp(-x)))
+
+
+def _log(*widths: float) -> tuple[float, ...]:
+    return tuple(float(np.log(width)) for width in widths)
+
+
+# Prior means and standard deviations, and starts of the fits. Widths are those of parts of 0.1 to 2 mm at 10 to
+# 60 px/mm.
+_WALL = ((*_log(3.0, 3.0), 0.0), (0.8, 0.8, 1.2))
+_INNER_WALL = (*_WALL, tuple(((*_log(width, width), 0.0), -0.5 * width, 0.0) for width in (1.2, 3.0, 7.0)))
+_SIDE_WALL = (*_WALL, tuple(((*_log(width, width), 0.0), -0.25 * width, -0.25 * width) for width in (1.5, 4.0)))
+_LINE = (
+    (*_log(2.0, 2.0, 0.5), 0.0),
+    (0.7, 0.7, 0.8, 0.5),
+    tuple(((*_log(near, 1.5, 0.6), 0.0), at, at) for near, at in ((0.7, 1.0), (0.7, 0.3), (3.0, 0.3))),
+)
+_BAND = (
+    (*_log(3.0), 0.0, 0.0),
+    (0.7, 1.2, 0.3),
+    tuple(((*_log(width), 0.0, 0.0), 0.5 * width, 0.5 * width) for width in (1.5, 4.0)),
+)
+_SHADOW = (
+    (-1.0, *_log(6.0), 0.0, *_log(0.5)),
+    (1.0, 0.7, 3.0, 1.2),
+    tuple(
+        ((-1.5, *_log(length), side, *_log(from_px)), -0.3, -0.3)
+        for side in (0.0, 5.0, -5.0)
+        for length, from_px in ((4.0, 0.3), (10.0, 0.3), (4.0, 3.0))
+    ),
+)
+
+NOTHING = Scene("", _nothing, (), (), (((), 0.0, 0.0),), 0.7)
+# Prior probabilities: one recording in ten shows a wall (thick parts), a shadow, or a bright line (edges that are
+# chamfered or polished).
+SCENES = (
+    Scene("wall", _wall(lambda side, is_outer: np.where(is_outer, 0.0, 1.0)), *_INNER_WALL, 0.06),
+    Scene("wall", _wall(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02),
+    Scene("wall", _wall(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02),
+    Scene("glare", _line, *_LINE, 0.05),
+    Scene("glare", _band, *_BAND, 0.05),
+    Scene("shadow", _shadow(_QUANTILES), *_SHADOW, 0.05),
+    Scene("shadow", _shadow(-np.log1p(-_QUANTILES)), *_SHADOW, 0.05),
+)
+
+# Distances of the steps that the score test tries, at the inner edges and at all of them.
+_PROBED_PX = np.array([-8.0, -4.0, -2.0, -1.0, 1.0, 2.0, 4.0, 8.0])
+
+
+def _probe(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+    count = _PROBED_PX.size
+    light = p[:, None, :count] + p[:, None, count:] * np.where(is_outer, 0.0, 1.0)[:, None]
+    at = np.broadcast_to(np.append(_PROBED_PX, 0.0), (len(p), side.size, count + 1))
+    return at, np.concatenate([light, 1.0 - light.sum(axis=-1, keepdims=True)], -1)
+
+
+PROBE = Scene("", _probe, (0.0,) * 16, (1.0,) * 16, (), 0.0)

@@ -1,0 +1,112 @@
+"""Learn what stands beside the edges (side walls, bright lines, shadows) from the straight flanks in some frames."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera_response import CameraResponse
+from calib.edge_profile import EdgeProfile
+from calib.edge_response import FamilyFit, fit_scenes, fixed_family, is_more_beside
+from calib.edge_scene import NOTHING
+from fingervision.domain.camera import BesideEdges
+from fingervision.domain.frame import Coding
+from fingervision.vision.flank_profiles import Seen, flank_profiles
+
+Floats = NDArray[np.float64]
+
+# Standard deviation of a real edge about the best model, smooth over a pixel, as a share of its contrast: optics
+# (0.003) with what real walls, lines and shadows differ from the models (0.004); JPEG of quality 85; H.264.
+DISCREPANCY = {Coding.LOSSLESS: 0.005, Coding.INTRAFRAME: 0.007, Coding.INTERFRAME: 0.012}
+# Extent of the profiles beyond the blur (pixels): the light comes back within this distance beside most shadows.
+BESIDE_PX = 12.0
+# Share of a displacement on the straight flanks by which that at the measuring point may differ: it may lie on a
+# fillet, and real walls, lines and shadows are not even along a finger.
+U_ELSEWHERE = 0.05
+# Probability of nothing beside the edges above which nothing is learnt.
+SURE = 0.99
+# Mean chi-square of a bin above which nothing that is known explains the edges.
+MOST_MISFIT = 1.15
+
+
+def learnt_beside(
+    seen: Sequence[Seen], response: CameraResponse, top_level: int, coding: Coding, noise: float
+) -> BesideEdges | None:
+    """What stands beside the edges in a recording of dark fingers; None if nothing does or nothing known explains it.
+
+    Parameters
+    ----------
+    seen : sequence of (ndarray, EdgePoints)
+        Pictures turned so that the tips point up, and the steps fitted in them.
+    response : CameraResponse
+        Response of the camera.
+    top_level : int
+        Full scale of the pictures.
+    coding : Coding
+        Compression of the pictures.
+    noise : float
+        Standard deviation of an edge about the best model, independent from place to place (share of the contrast).
+    """
+    profiles = flank_profiles(seen, top_level, BESIDE_PX)
+    family = fixed_family(response)
+    if not can_tell_beside(profiles) or not is_more_beside(profiles, noise, family):
+        return None
+    fits = fit_scenes(profiles, DISCREPANCY[coding], [family])
+    return beside_edges(fits, profiles)
+
+
+def can_tell_beside(profiles: Sequence[EdgeProfile]) -> bool:
+    """Whether both inner flanks and an outer one are in view: a wall is told by the flanks that do not show it."""
+    inner = sum(not profile.is_outer for profile in profiles)
+    return inner == 2 and len(profiles) > inner
+
+
+def beside_edges(fits: Sequence[FamilyFit], profiles: Sequence[EdgeProfile]) -> BesideEdges | None:
+    """Mean over fits of one tone curve by their evidence; None if nothing is there, or nothing known explains it."""
+    misfit = max(float(np.mean(fits[0].misfit)), 1.0)
+    if misfit > MOST_MISFIT:
+        return None
+    evidence = np.array([fit.log_evidence / misfit + np.log(fit.scene.probability) for fit in fits])
+    weight = np.exp(evidence - evidence.max())
+    weight /= weight.sum()
+    nothing = sum(float(w) for w, fit in zip(weight, fits, strict=True) if fit.scene is NOTHING)
+    if nothing > SURE:
+        return None
+    best = fits[int(weight.argmax())]
+    side = np.array([profile.side for profile in profiles])
+    is_outer = np.array([profile.is_outer for profile in profiles])
+    # The ground lies to the right of the left finger's inner edge and of the right finger's outer one.
+    finger = np.where((side > 0.0) == ~is_outer, 0, 1)
+    place = {(int(k), bool(o)): i for i, (k, o) in enumerate(zip(finger, is_outer, strict=True))}
+    at = np.array([fit.at_px for fit in fits])
+    far = np.array([fit.at_px + fit.outline_px(side, is_outer) for fit in fits])
+
+    def mean(values: Floats, is_outer: bool) -> tuple[float, float]:
+        left, right = (float(weight @ values[:, place[k, is_outer]]) if (k, is_outer) in place else 0.0 for k in (0, 1))
+        return left, right
+
+    def u_sum(values: Floats) -> float:
+        ends = [place[0, False], place[1, False]]
+        sums = values[:, ends].sum(axis=1)
+        own = np.array([misfit * fit.at_covariance[np.ix_(ends, ends)].sum() for fit in fits])
+        own += (U_ELSEWHERE * np.abs(values[:, ends]).sum(axis=1)) ** 2
+        return float(np.sqrt(weight @ (own + (sums - weight @ sums) ** 2)))
+
+    inner, outer = mean(at, False), mean(at, True)
+    # A wall or a light from one side displaces the sides that show it, and what all sides have in common also the tips.
+    common = np.zeros_like(at)
+    for own, fit in zip(common, fits, strict=True):
+        if fit.scene.name != "wall":
+            ends = [[fit.at_px[i] for (k, _), i in place.items() if k == finger] for finger in (0, 1)]
+            own[[place[0, False], place[1, False]]] = [min(each, key=abs) for each in ends]
+    name = best.scene.name or "shadow"
+    return BesideEdges(
+        name,
+        float(sum(w for w, fit in zip(weight, fits, strict=True) if fit.scene.name == name)),
+        inner,
+        outer,
+        mean(far, False),
+        mean(common, False),
+        u_sum(at),
+        u_sum(far),
+    )

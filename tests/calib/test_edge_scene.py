@@ -1,0 +1,87 @@
+"""What stands beside an edge is told from the profiles of all flanks together, drawn here by integrating the light."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from calib.edge_profile import EdgeProfile
+from calib.edge_response import family, fit_scenes, is_more_beside, probabilities
+from calib.edge_scene import NOTHING, SCENES, Scene
+
+Floats = NDArray[np.float64]
+
+FINE_PX, BLUR_PX, NOISE = 0.01, 1.1, 0.0015
+DARK, LIGHT = 0.08, 0.7
+# Direction towards the ground, and whether the flank is an outer one: left finger, then right finger.
+FLANKS = ((1.0, False), (-1.0, True), (-1.0, False), (1.0, True))
+
+
+def nothing(t: Floats, is_outer: bool) -> Floats:
+    return np.where(t > 0.0, LIGHT, DARK)
+
+
+def wall(t: Floats, is_outer: bool) -> Floats:
+    return np.where((t > 0.0) & (t < 2.5) & (not is_outer), 0.4, nothing(t, is_outer))
+
+
+def line(t: Floats, is_outer: bool) -> Floats:
+    return nothing(t, is_outer) + np.where((t < -1.0) & (t > -2.2), 0.4, 0.0)
+
+
+def shadow(t: Floats, is_outer: bool) -> Floats:
+    return nothing(t, is_outer) * np.where(t > 0.0, 1.0 - 0.35 * np.clip(1.0 - t / 7.0, 0.0, 1.0), 1.0)
+
+
+def profiles(light: Callable[[Floats, bool], Floats], at_px: float, rng: np.random.Generator) -> list[EdgeProfile]:
+    """Profiles whose zero lies `at_px` inside the edge, as if a step had been fitted there."""
+    fine = np.arange(-40.0, 40.0, FINE_PX)
+    away = np.arange(-15.0, 15.0, 0.2)
+    found = []
+    for side, is_outer in FLANKS:
+        seen = gaussian_filter1d(light(fine, is_outer), BLUR_PX / FINE_PX)
+        pixel = np.convolve(seen, np.full(101, 1.0 / 101.0), "same")
+        level = np.interp(away - at_px, fine, pixel) + NOISE * rng.standard_normal(away.size)
+        found.append(EdgeProfile(away, level, np.full(away.size, NOISE), side, is_outer))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("light", "name"), [(wall, "wall"), (line, "glare"), (shadow, "shadow")], ids=["wall", "line", "shadow"]
+)
+def test_the_edge_is_found_beside_what_displaces_a_step(light: Callable[[Floats, bool], Floats], name: str) -> None:
+    rng = np.random.default_rng(21)
+    seen = profiles(light, 0.3, rng)
+    assert is_more_beside(seen, 0.001, family("linear"))
+    fits = fit_scenes(seen, 0.005, [family("linear")])
+    assert fits[0].scene.name == name
+    # A line and a band up to the edge look nearly alike, so that the mean over all fits is compared.
+    weight = probabilities(fits)
+    at = np.array([fit.at_px for fit in fits])
+    own = np.array([np.diag(fit.at_covariance) for fit in fits])
+    mean = weight @ at
+    u_px = np.sqrt(weight @ (own + (at - mean) ** 2))
+    inner = ~np.array([profile.is_outer for profile in seen])
+    assert np.all(np.abs(mean - 0.3)[inner] < 2.5 * u_px[inner])
+    assert u_px.max() < 0.3
+
+
+def test_a_bare_edge_is_no_reason_to_look_for_more() -> None:
+    rng = np.random.default_rng(22)
+    seen = profiles(nothing, 0.3, rng)
+    assert not is_more_beside(seen, 0.001, family("linear"))
+    fits = fit_scenes(seen, 0.003, [family("linear")])
+    assert fits[0].scene is NOTHING
+    assert fits[0].at_px == pytest.approx(0.3, abs=0.06)
+
+
+@pytest.mark.parametrize("scene", [NOTHING, *SCENES])
+def test_steps_add_up_to_the_contrast(scene: Scene) -> None:
+    rng = np.random.default_rng(23)
+    sets = np.array(scene.mean) + np.array(scene.u) * rng.standard_normal((20, len(scene.mean)))
+    side, is_outer = (np.array(each) for each in zip(*FLANKS, strict=True))
+    distances, weights = scene.steps(sets, side, is_outer)
+    assert distances.shape == weights.shape
+    assert weights.sum(axis=-1) == pytest.approx(1.0)
