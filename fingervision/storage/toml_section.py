@@ -95,7 +95,7 @@ def read_document(path: Path, what: str) -> tuple[dict[str, Any], str]:
 
 
 def line_of(text: str, header: str, place: int = 0, key: str | None = None) -> int:
-    """Line number, from 1, of the nth `[header]` or `[[header]]` of a file, or of a key below it.
+    """Line number, from 1, of the nth `[header]` or `[[header]]` of a file, or of a key or table below it.
 
     The library tomllib reports no line numbers, so that the text is searched for headers in their usual spelling; 1 is
     returned if the header is not found.
@@ -113,6 +113,8 @@ def line_of(text: str, header: str, place: int = 0, key: str | None = None) -> i
                 break
             if of_key.match(lines[number]):
                 return number + 1
+        of_table = re.compile(rf"^\s*\[\[?\s*{re.escape(f'{header}.{key}' if header else key)}\s*[\].]")
+        begin = next((number for number in range(begin, len(lines)) if of_table.match(lines[number])), begin - 1) + 1
     return max(begin, 1)
 
 

@@ -103,6 +103,14 @@ def test_a_recipe_that_cannot_be_run_is_said_with_its_line(tmp_path: Path, step:
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize("table", ["[bussy]", "[[bussy]]", "[ bussy ]", "[bussy.here]"])
+def test_an_unknown_table_is_said_with_its_line(table: str, tmp_path: Path) -> None:
+    path = tmp_path / "bed.toml"
+    path.write_text(f'schema = 1\n[actuator]\nkind = "simulated"\n\n{table}\nsay = "?"\n', encoding="utf-8")
+    with pytest.raises(DataError, match="bussy in line 5 of "):
+        open_bed(str(path))
+
+
 def test_a_force_that_the_gripper_would_need_is_foreseen(tmp_path: Path) -> None:
     text = 'schema = 1\nbelow_force_n = 1.0\n[[step]]\nkind = "move"\nto_mm = 1.2\nspeed_mm_s = 1.0\n'
     with pytest.raises(DataError, match=r"to_mm in line 5 .* limit of force at 1\.2 mm, 1 N: it needs 2\.46"):

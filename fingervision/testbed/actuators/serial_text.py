@@ -100,7 +100,7 @@ class TextStage(SingleAxis):
         self._awaited = None
 
     def _release(self) -> None:
-        self._talk.close(self._actions.get("close"))
+        self._talk.close()
 
     def _command(self, exchange: Exchange, values: dict[str, str | float]) -> None:
         self._talk.do(exchange, values)

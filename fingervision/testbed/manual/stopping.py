@@ -8,7 +8,7 @@ from fingervision.domain.errors import DeviceError
 from fingervision.testbed.bed_factory import SIMULATED, open_bed, read_configuration
 from fingervision.testbed.device_kinds import kind_of
 
-LETS_GO_WITHIN_S = 5.0
+LETS_GO_WITHIN_S, STOPS_WITHIN_S = 5.0, 2.0
 LOOK_EVERY_S = 0.02
 
 
@@ -46,6 +46,14 @@ def stop_bed(name: str) -> str:
     bed = open_bed(name)
     try:
         bed.actuator.stop()
+        until_s = bed.clock.now_s() + STOPS_WITHIN_S
+        while bed.actuator.busy:
+            if bed.clock.now_s() > until_s:
+                raise DeviceError(
+                    f"{bed.actuator.name} must be at rest {STOPS_WITHIN_S:g} s after it was told to stop, but reports "
+                    "motion: use the emergency stop."
+                )
+            bed.clock.wait_until(bed.clock.now_s() + LOOK_EVERY_S)
+        return f"{words}Stopped: {bed.actuator.name} reports no motion."
     finally:
         bed.close()
-    return f"{words}The motor is at rest, and all lines of its controller are off."

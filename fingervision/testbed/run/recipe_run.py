@@ -1,13 +1,11 @@
 """Run a recipe on a test bed: plan it, check it, execute it, record it."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import FingervisionError
 from fingervision.domain.recipe import Recipe
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.samples_csv import SampleRow
@@ -85,14 +83,8 @@ class Runner:
             with watch.controls.listening((lambda: None) if replays else actuator.stop):
                 self._execute()
         except BaseException:
-            try:
-                actuator.stop()
-            finally:
-                if not replays:
-                    # No later readings will improve the last positions: write their rows now. A test bed that replays
-                    # records these frames again.
-                    with suppress(FingervisionError):
-                        watch.record.write(at_once=True)
+            # Rows that still wait for their position are left out: no reading says where the stage was when it stopped.
+            actuator.stop()
             raise
         return watch.record.counts
 

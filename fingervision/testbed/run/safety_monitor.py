@@ -69,6 +69,8 @@ class Watch:
         """
         self._end_if_stopped()
         look = self.sight.look()
+        # Between the last reading in motion and the first one after a stop, nobody knows where the stage was.
+        self._end_if_stopped()
         alarm = self.bed.actuator.alarm
         if alarm is not None:
             raise DeviceError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")

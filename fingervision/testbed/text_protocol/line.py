@@ -15,7 +15,7 @@ from fingervision.testbed.text_protocol.words import Exchange, Words, filled
 
 KEYS = ("words", "port", "baud", "set")
 IDENTITY = "identity"
-TRIES, LATE_S = 2, 0.1
+TRIES, LATE_S, CLOSES_S = 2, 0.1, 0.5
 """A question is asked again once, because one line in a noisy cable may be spoilt; a command never is."""
 
 
@@ -59,8 +59,13 @@ class SerialPort:
         return line + end
 
     def close(self) -> None:
-        """Release the port."""
-        self._port.close()
+        """Release the port once it is quiet: a connection closed over unread answers discards what was said last."""
+        until_s, self._port.timeout = monotonic() + CLOSES_S, LATE_S
+        try:
+            while self._port.read(max(1, self._port.in_waiting)) and monotonic() < until_s:
+                pass
+        finally:
+            self._port.close()
 
 
 class VisaPort:
@@ -112,11 +117,19 @@ class Line:
     def __init__(self, port: Port, words: Words) -> None:
         self._port, self._words, self._settings = port, words, dict(words.settings)
         self._said = ""  # the last words, which a refusal refers to
-        sleep(words.open_s)
-        for each in words.opening:
-            found = self.do(each, {})
-            if found is not None and "keep" in each.more:
-                self._settings[str(each.more["keep"])] = found[1]
+        kept = [str(each.more.get("keep", "")) for each in words.opening]
+        for name in kept:
+            self._settings.pop(name, None)
+        try:
+            sleep(words.open_s)
+            for each, name in zip(words.opening, kept, strict=True):
+                found = self.do(each, {})
+                if found is not None and name:
+                    self._settings[name] = found[1]
+        except BaseException:
+            with suppress(Exception):
+                self.close()
+            raise
 
     def do(self, exchange: Exchange, values: Mapping[str, str | float]) -> re.Match[str] | None:
         """Say the lines of an exchange, and await the reply to each; return the last reply.
@@ -177,12 +190,13 @@ class Line:
             found |= awaited is not None and bool(awaited.search(line))
         return found
 
-    def close(self, exchange: Exchange | None) -> None:
-        """Say the last words, and release the port."""
+    def close(self) -> None:
+        """Say the last words, and release the port; words that give back what was never read are not said."""
         try:
-            if exchange is not None:
+            for exchange in (each for name, each in self._words.actions.items() if name == "close"):
                 for text in exchange.say:
-                    self.say(text, exchange, {})
+                    with suppress(KeyError):
+                        self.say(text, exchange, {})
         finally:
             self._port.close()
 
@@ -246,9 +260,4 @@ def opened_line(section: Section, words: Words) -> Line:
     try:
         return Line(port, words)
     except RefusedError as error:
-        port.close()
         raise DeviceError(f"{words.name} at {name} must accept its first words, but refused them ({error}).") from error
-    except BaseException:
-        with suppress(Exception):
-            port.close()
-        raise

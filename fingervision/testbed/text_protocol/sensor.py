@@ -79,7 +79,7 @@ class TextSensor:
         if not self._closed:
             self._closed = True
             self._thread.join(self._asks.within_s + 1.0)
-            self._talk.close(None)
+            self._talk.close()
 
     def _read(self) -> None:
         failed = ""

@@ -48,7 +48,8 @@ class Plant:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._from = self._to = self._speed = self._began_s = 0.0
+        # Time of its beginning, begin, end and speed of every motion.
+        self._motions = [(-1e9, 0.0, 0.0, 0.0)]
         self.speed = 1.0
         self.lost_mm = self.strays_mm = 0.0
         self.homed = self.homing = False
@@ -57,31 +58,36 @@ class Plant:
         with self._lock:
             return self._at() + random.uniform(-self.strays_mm, self.strays_mm)
 
-    def _at(self) -> float:
-        way = self._to - self._from
-        done = min(abs(way), self._speed * (Time.now_s() - self._began_s))
-        return self._from + (done if way > 0 else -done)
+    def was_at(self, time_s: float) -> float:
+        """True position at a time that has passed."""
+        with self._lock:
+            return self._at(time_s)
+
+    def _at(self, time_s: float | None = None) -> float:
+        time_s = Time.now_s() if time_s is None else time_s
+        began_s, start, to, speed = next(each for each in reversed(self._motions) if each[0] <= time_s)
+        done = min(abs(to - start), speed * (time_s - began_s))
+        return start + (done if to > start else -done)
 
     @property
     def target(self) -> float:
-        return self._to
+        return self._motions[-1][2]
 
     @property
     def moves(self) -> bool:
-        return Time.now_s() < self._began_s + abs(self._to - self._from) / max(self._speed, 1e-9)
+        began_s, start, to, speed = self._motions[-1]
+        return Time.now_s() < began_s + abs(to - start) / max(speed, 1e-9)
 
     def go(self, to: float, speed: float | None = None) -> None:
         with self._lock:
-            self._from, self._to = self._at(), to + self.lost_mm
-            self._speed, self._began_s = speed or self.speed, Time.now_s()
+            self._motions.append((Time.now_s(), self._at(), to + self.lost_mm, speed or self.speed))
 
     def halt(self) -> None:
-        with self._lock:
-            self._from = self._to = self._at()
+        self.stands_at(self._at())
 
     def stands_at(self, mm: float) -> None:
         with self._lock:
-            self._from = self._to = mm
+            self._motions.append((Time.now_s(), mm, mm, 0.0))
 
 
 class Emulator:

@@ -1,18 +1,20 @@
 """Files of words: the one of the manual drives its invented controller, and mistakes are named with their line."""
 
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
-from fingervision.domain.errors import DataError, DeviceError
+from fingervision.domain.errors import DataError, DeviceError, FingervisionError
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.manual import manual_control
+from fingervision.testbed.manual.stopping import stop_bed
 from fingervision.testbed.text_protocol.words import known_words
-from tests.testbed.stages.emulators import Conex, Emulator, Invented
-from tests.testbed.stages.stage_cases import Case, text
+from tests.testbed.stages.emulators import Conex, Emulator, Invented, Zaber
+from tests.testbed.stages.stage_cases import CASES, Case, text
 
 pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
 PAGE = (Path(__file__).parents[3] / "docs" / "how_to" / "stages.md").read_text(encoding="utf-8")
@@ -103,6 +105,49 @@ def test_bed_check_names_a_mistake_without_the_controller(right: str, wrong: str
     done = CliRunner().invoke(cli, ["bed", "check", str(tmp_path / "recipe.toml"), "--bed", str(tmp_path / "bed.toml")])
     assert done.exit_code == 1
     assert re.search(says, done.output + str(done.exception))
+
+
+class Refusing(Invented):
+    """Refuses one of its commands."""
+
+    refused = ""
+
+    def answer(self, line: str) -> list[str]:
+        return ["ERR no"] if self.refused and self.refused in line else super().answer(line)
+
+
+@pytest.mark.parametrize("refused", ["", "GOTO", "POS?", "ID?"])
+def test_the_last_words_are_said_however_a_connection_ends(refused: str, tmp_path: Path) -> None:
+    """Also after a refusal of a motion, of the first question and of the first words, and after `bed stop`."""
+    device = Refusing()
+    device.refused = refused
+    path = str(bed_with(EXAMPLE + '\n[close]\nsay = "{axis}BYE"\n', device, tmp_path))
+    for end in (lambda: stop_bed(path), lambda: moved(path)):
+        device.heard.clear()
+        with suppress(FingervisionError):
+            end()
+        device.settle()
+        assert device.heard[-1].strip() == "1BYE"
+    device.close()
+
+
+def moved(path: str) -> None:
+    bed = open_bed(path)
+    try:
+        manual_control.move(bed, 0.1, 1.0)
+    finally:
+        bed.close()
+
+
+def test_a_setting_that_was_never_read_is_not_given_back(tmp_path: Path) -> None:
+    """A Zaber stage that refuses its first question keeps its highest speed."""
+    device = Zaber()
+    device.do = lambda words: ("RJ", "BADCOMMAND")  # type: ignore[method-assign]
+    with pytest.raises(DeviceError):
+        open_bed(str(CASES["zaber"].bed_at(tmp_path, device)))
+    device.settle()
+    assert not [line for line in device.heard if "set maxspeed" in line]
+    device.close()
 
 
 def test_every_file_of_the_package_stands_in_the_manual() -> None:
