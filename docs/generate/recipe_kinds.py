@@ -1,16 +1,14 @@
-"""The reference of a recipe's steps: the kinds that the test bed knows, each with its keys."""
+"""The reference of a recipe's steps: the kinds that the test bed knows, and their keys."""
 
-import importlib
-
-from fingervision.testbed import recipe_kinds
+from fingervision.domain.field import names_of, reference_table
+from fingervision.testbed.recipe_kinds import step_kinds, words_of
 
 
 def recipe_kinds_page() -> str:
-    """Write a row for each kind of step."""
+    """Write a row for each kind of step, and a row for each key."""
     rows = []
-    for name in recipe_kinds.step_kinds():
-        kind = importlib.import_module(f"{recipe_kinds.__name__}.{name}")
-        first = (kind.__doc__ or "").strip().splitlines()[0].removeprefix("Recipe step: ")
-        keys = ", ".join(f"`{key}`" for key in kind.KEYS) or "none"
-        rows.append(f"| `{name}` | {keys} | {first[:1].upper()}{first[1:]} |")
-    return "\n".join(["| `kind` | keys | what the test bed does |", "|---|---|---|", *rows]) + "\n"
+    for name, kind in step_kinds().items():
+        keys = ", ".join(f"`{key}`" for key in names_of(kind)) or "none"
+        rows.append(f"| `{name}` | {keys} | {words_of(kind)} |")
+    table = ["| `kind` | keys | what the test bed does |", "|---|---|---|", *rows]
+    return "\n".join([*table, "", reference_table(*step_kinds().values())]) + "\n"

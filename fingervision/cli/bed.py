@@ -22,6 +22,19 @@ Examples:
   fingervision bed run recipe.toml --hide backlash:play_mm=0.2 --out hidden
   fingervision bed run next_run.toml --bed lab.toml --out second
   fingervision bed check recipe.toml
+  fingervision bed recipe
+"""
+RECIPE_EXAMPLES = """
+\b
+Examples:
+  fingervision bed recipe
+  fingervision bed recipe staircase
+
+\b
+  schema = 1                       A file of steps, executed one after another.
+  below_force_n = 5.0              force at which the motor stops in any step; may be left out
+  [[step]]
+  kind = "triangle"                with the keys of this kind
 """
 RUN_EXAMPLES = """
 \b
@@ -192,7 +205,7 @@ def check(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
     if as_json:
         document = {
             "recipe": recipe.name, "bed": done.bed.name, "fits": not done.refusals, "seconds": done.seconds,
-            "frames": done.frames, "megabytes": done.megabytes,
+            "frames": done.frames, "frames_at_most": done.frames_at_most, "megabytes": done.megabytes,
             "limits": {key: value if abs(value) < float("inf") else None for key, value in asdict(limits).items()},
             "steps": [asdict(step) for step in done.steps],
         }  # fmt: skip
@@ -205,10 +218,14 @@ def check(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
         )
         for step in done.steps:
             click.echo(line(step).rstrip())
+        most, settling_s = done.frames_at_most, done.bed.actuator.limits.settling_s
+        frames = f"{done.frames} to {most}" if most > done.frames else f"{most}"
         click.echo(
-            f"{len(done.steps)} steps, {done.seconds:.0f} s, {done.frames} frames at {done.bed.rate_hz:g} Hz, up to "
-            f"{done.megabytes:.0f} MB of lossless video"
+            f"{len(done.steps)} steps, {done.seconds:.0f} s, {frames} recorded frames at {done.bed.rate_hz:g} Hz, "
+            f"up to {done.megabytes:.0f} MB of lossless video"
         )
+        if settling_s:
+            click.echo(f"each motion may take longer by up to {settling_s:g} s (settling_s)")
         speed = "any speed" if limits.speed_mm_s == float("inf") else f"{limits.speed_mm_s:g} mm/s"
         click.echo(
             f"limits of the test bed: {limits.lower_mm:g} to {limits.upper_mm:g} mm, {speed}, {limits.force_n:g} N, "
@@ -222,6 +239,13 @@ def check(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
                 f"not tested: whether the {part.replace('_', ' ')} passes its contract tests; this command line runs "
                 f"them{', and moves the stage' if part == 'actuator' else ''}:\n  {_contract_line(part, bed_name)}"
             )
+        if not done.bed.is_simulated:
+            shown = (
+                "`bed run` stops if the gap moves 3 times as far as the model predicts, and warns of a third"
+                if done.bed.model is not None
+                else "no [gripper] states what the gap should do, so that nothing here shows it: measure one `bed move`"
+            )
+            click.echo(f"not tested: whether a millimetre of the stage is one (its units, and all limits): {shown}.")
         click.echo("The test bed can execute the recipe.")
 
 
@@ -236,6 +260,18 @@ def _contract_line(part: str, bed_name: str) -> str:
         f'print(run({contract}, open_bed=lambda: bed_at({json.dumps(bed_name)})) or "keeps the contract")'
     )
     return f"python -c {quote(program)}"
+
+
+@command.command("recipe", epilog=RECIPE_EXAMPLES)
+@click.argument("kind", required=False)
+def recipe(kind: str | None) -> None:
+    """List the kinds of a recipe's steps with their keys, or only those of KIND."""
+    from fingervision.domain.errors import UsageError
+    from fingervision.testbed.recipe_kinds import described, step_kinds
+
+    if kind is not None and kind not in step_kinds():
+        raise UsageError(f"A step must be of a kind that exists ({', '.join(step_kinds())}), but is {kind}.")
+    click.echo("\n\n".join(described(each) for each in ([kind] if kind else step_kinds())))
 
 
 @command.command("move", epilog=MOVE_EXAMPLES, context_settings={"ignore_unknown_options": True})

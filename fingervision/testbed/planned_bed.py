@@ -42,6 +42,8 @@ class PlannedBed:
         Width and height of the pictures.
     px_per_mm : float or None
         Scale of the camera; None if the configuration states none.
+    is_simulated : bool
+        Whether every part is simulated.
     plugged : tuple of str
         Devices (`actuator`, `force_sensor`, `camera`) whose kind is a file or comes from another distribution.
     """
@@ -53,6 +55,7 @@ class PlannedBed:
     rate_hz: float
     size_px: tuple[int, int]
     px_per_mm: float | None
+    is_simulated: bool
     plugged: tuple[str, ...] = ()
 
     @property
@@ -108,6 +111,7 @@ def planned_bed(name: str) -> PlannedBed:
             camera.whole("height_px", CAMERA_PX[1], low=16, high=16384),
         ),
         px_per_mm=None if scale is None else scale.px_per_mm,
+        is_simulated=False,
         plugged=plugged,
     )
 
@@ -124,5 +128,6 @@ def _of(bed: Bed, top: Section, plugged: tuple[str, ...]) -> PlannedBed:
         rate_hz=described.rate_hz or CAMERA_HZ,
         size_px=(described.width_px, described.height_px),
         px_per_mm=None if bed.scale is None else bed.scale.px_per_mm,
+        is_simulated=True,
         plugged=plugged,
     )

@@ -10,7 +10,6 @@ import pytest
 
 from fingervision.domain.status import Status
 from fingervision.storage import response_csv
-from fingervision.testbed import recipe_kinds
 
 ROOT = Path(__file__).parents[2]
 FORMATS = (ROOT / "docs" / "reference" / "file_formats.md").read_text(encoding="utf-8")
@@ -37,13 +36,6 @@ def keys_in(*paths: str) -> set[str]:
 def test_every_key_stands_in_the_reference(what: str, keys: set[str]) -> None:
     missing = {key for key in keys if key not in NAMED}
     assert not missing, f"docs/reference/file_formats.md says nothing of these keys of {what}: {sorted(missing)}"
-
-
-def test_every_key_of_a_recipe_stands_in_the_reference() -> None:
-    page = (ROOT / "docs" / "reference" / "recipes.md").read_text(encoding="utf-8")
-    for name in recipe_kinds.step_kinds():
-        for key in importlib.import_module(f"{recipe_kinds.__name__}.{name}").KEYS:
-            assert f"`{key}`" in page, f"{key} of {name}"
 
 
 def test_every_file_that_a_page_names_is_there() -> None:

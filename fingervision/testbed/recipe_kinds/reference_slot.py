@@ -1,14 +1,22 @@
 """Recipe step: measure a slot of known width that the operator puts in the gripper's place."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
 
+from fingervision.domain.field import Field
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.recipe_kinds import Asked
 from fingervision.testbed.run.motion_segments import Slot
 
-KEYS = ("size_mm", "u_size_mm")
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Measure a slot of known width that the operator puts in the gripper's place."""
 
-def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield one action: the slot is inserted, measured and removed."""
-    yield Slot(section.number("size_mm", above=0.0), section.number("u_size_mm", 0.0, low=0.0)), "size_mm"
+    size_mm: Annotated[float, Field("width of the slot that the operator puts in the gripper's place", "mm", above=0.0)]
+    u_size_mm: Annotated[float, Field("standard uncertainty of this width", "mm", low=0.0)] = 0.0
+
+    def acts(self, section: Section, at_mm: float) -> Iterator[Asked]:
+        """Yield one action: the slot is inserted, measured and removed."""
+        yield Slot(self.size_mm, self.u_size_mm), "size_mm"

@@ -1,14 +1,17 @@
-"""Recipe step: search the reference of the stage again, which sets position 0."""
+"""Recipe step: search the reference of the stage again, which sets position 0; a new run begins."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.recipe_kinds import Asked
 from fingervision.testbed.run.motion_segments import Rezero
 
-KEYS = ()
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Search the reference of the stage again, which sets position 0; a new run begins."""
 
-def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield one action, which begins a new run."""
-    yield Rezero(), "kind"
+    def acts(self, section: Section, at_mm: float) -> Iterator[Asked]:
+        """Yield one action, which begins a new run."""
+        yield Rezero(), "kind"

@@ -1,14 +1,17 @@
-"""Recipe step: the operator shifts the camera, so that the fingers appear elsewhere in the picture."""
+"""Recipe step: ask the operator to shift the camera; a new run begins."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.recipe_kinds import Asked
 from fingervision.testbed.run.motion_segments import Shift
 
-KEYS = ()
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Ask the operator to shift the camera, so that the fingers appear elsewhere in the picture; a new run begins."""
 
-def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield one action, which begins a new run."""
-    yield Shift(), "kind"
+    def acts(self, section: Section, at_mm: float) -> Iterator[Asked]:
+        """Yield one action, which begins a new run."""
+        yield Shift(), "kind"

@@ -1,22 +1,31 @@
 """Recipe step: move to a position and back at constant speed."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
 
+from fingervision.domain.field import Field
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.recipe_kinds import Asked, frames_of
+from fingervision.testbed.recipe_kinds import Asked, Frames, From, Speed, To
 from fingervision.testbed.run.motion_segments import Go
 
-KEYS = ("from_mm", "to_mm", "speed_mm_s", "cycles", "frames")
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Move to a position and back at constant speed."""
 
-def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield a move to the first position if the stage is elsewhere, then out and back for each cycle."""
-    from_mm, to_mm = section.number("from_mm"), section.number("to_mm")
-    speed, frames = section.number("speed_mm_s", above=0.0), frames_of(section)
-    if from_mm == to_mm:
-        section.refuse("to_mm", f"must differ from from_mm, but both are {to_mm:g}.")
-    if at_mm != from_mm:
-        yield Go(from_mm, speed, frames), "from_mm"
-    for _ in range(section.whole("cycles", 1, low=1)):
-        yield Go(to_mm, speed, frames), "to_mm"
-        yield Go(from_mm, speed, frames), "from_mm"
+    from_mm: From
+    to_mm: To
+    speed_mm_s: Speed
+    cycles: Annotated[int, Field("number of motions there and back; 1 if not given", low=1, high=1_000_000)] = 1
+    frames: Frames = None
+
+    def acts(self, section: Section, at_mm: float) -> Iterator[Asked]:
+        """Yield a move to the first position if the stage is elsewhere, then out and back for each cycle."""
+        if self.from_mm == self.to_mm:
+            section.refuse("to_mm", f"must differ from from_mm, but both are {self.to_mm:g}.")
+        if at_mm != self.from_mm:
+            yield Go(self.from_mm, self.speed_mm_s, self.frames), "from_mm"
+        for _ in range(self.cycles):
+            yield Go(self.to_mm, self.speed_mm_s, self.frames), "to_mm"
+            yield Go(self.from_mm, self.speed_mm_s, self.frames), "from_mm"

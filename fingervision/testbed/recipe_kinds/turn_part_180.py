@@ -1,14 +1,17 @@
-"""Recipe step: the operator turns the part by 180 degrees in the picture."""
+"""Recipe step: ask the operator to turn the part by 180 degrees in the picture; a new run begins."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.recipe_kinds import Asked
 from fingervision.testbed.run.motion_segments import Turn
 
-KEYS = ()
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Ask the operator to turn the part by 180 degrees in the picture; a new run begins."""
 
-def acts(section: Section, at_mm: float) -> Iterator[Asked]:
-    """Yield one action, which begins a new run."""
-    yield Turn(), "kind"
+    def acts(self, section: Section, at_mm: float) -> Iterator[Asked]:
+        """Yield one action, which begins a new run."""
+        yield Turn(), "kind"

@@ -91,6 +91,12 @@ class Leg:
     key: str = "kind"
 
     @property
+    def is_continuous(self) -> bool:
+        """Whether every frame of the segment is recorded."""
+        act = self.act
+        return isinstance(act, Swing | Close) or (isinstance(act, Go | Stand) and act.frames is None)
+
+    @property
     def words(self) -> str:
         """Description of the segment in words."""
         match self.act:

@@ -1,8 +1,8 @@
 """A recipe as a sequence of motion segments, and whether the actuator can make each of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import tau
+from math import ceil, tau
 
 import numpy as np
 
@@ -12,15 +12,17 @@ from fingervision.domain.recipe import Recipe
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import MoveCheck
 from fingervision.testbed.motion.soft_limits import SoftLimits
-from fingervision.testbed.recipe_kinds import kind_of
+from fingervision.testbed.recipe_kinds import step_of
 from fingervision.testbed.recipe_kinds.sine import fastest_mm_s
-from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Slot, Stand, Swing
+from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
 
 # Tolerance of the limits for the rounding of positions.
 SLACK_MM = 1e-9
 # Time for settling before the frames at a point.
 SETTLE_S = 0.3
 REZERO_S = 2.0
+# A recorded run begins at rest, if its first segment is recorded continuously.
+REST_FRAMES = 5
 # A run that takes longer than a month is assumed to be a mistake in the recipe.
 LONGEST_S = 30.0 * 86400.0
 
@@ -115,12 +117,35 @@ def timed_segments(
     DataError
         The settings of the step are not valid.
     """
-    for act, key in kind_of(section).acts(section, at_mm):
+    for act, key in step_of(section).acts(section, at_mm):
         leg = Leg(act, number, section, key)
         lasts_s, at_mm = _lasts(leg, at_mm, limits, rate_hz)
         if lasts_s > LONGEST_S:
             section.refuse(key, f"must end within {LONGEST_S / 86400.0:g} days, but takes {lasts_s:.3g} s.")
         yield Timed(leg, lasts_s, at_mm)
+
+
+def frames_of(segments: Sequence[Timed], rate_hz: float, settling_s: float) -> tuple[int, int]:
+    """Least and largest number of frames that the segments record.
+
+    Each motion may take longer by the settling time of the stage, closing until contact may end at once, and one frame
+    more may fall into a segment.
+    """
+    least = most = 0
+    starts = True
+    for leg, seconds in ((each.leg, each.seconds) for each in segments):
+        act = leg.act
+        if leg.is_continuous:
+            moves = isinstance(act, Go)
+            # One more frame is recorded where a motion ends.
+            whole = ceil(seconds * rate_hz - SLACK_MM) + moves
+            rest = REST_FRAMES if starts else 0
+            least += rest + (0 if isinstance(act, Close) else whole)
+            most += rest + whole + 1 + (ceil(settling_s * rate_hz) if moves else 0)
+        elif isinstance(act, Go | Stand):
+            least, most = least + (act.frames or 0), most + (act.frames or 0)
+        starts = isinstance(act, Rezero | Turn | Shift)
+    return least, most
 
 
 def _lasts(leg: Leg, at_mm: float, limits: SoftLimits, rate_hz: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from fingervision.domain.recipe import Recipe
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.planned_bed import PlannedBed
 from fingervision.testbed.run.motion_segments import Close, Go, Leg, Swing
-from fingervision.testbed.run.plan import SLACK_MM, Timed, check_moves, plan, timed_segments
+from fingervision.testbed.run.plan import SLACK_MM, Timed, check_moves, frames_of, plan, timed_segments
 from fingervision.testbed.run.run_folder import BYTES_PER_PX
 
 POSITIONS = 41
@@ -68,8 +68,8 @@ class RecipeCheck:
         Steps in order.
     seconds : float
         Expected duration of all steps.
-    frames : int
-        Number of frames that the camera delivers during this time.
+    frames, frames_at_most : int
+        Number of frames that the run records, and that it records if each motion takes the stage's whole settling time.
     megabytes : float
         Space that their lossless video may need.
     """
@@ -78,6 +78,7 @@ class RecipeCheck:
     steps: tuple[CheckedStep, ...]
     seconds: float
     frames: int
+    frames_at_most: int
     megabytes: float
 
     @property
@@ -98,6 +99,7 @@ def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
     """
     at_mm = 0.0
     steps: list[CheckedStep] = []
+    timed: list[Timed] = []
     for number, section in enumerate(recipe.steps, start=1):
         refusal = None
         try:
@@ -111,11 +113,11 @@ def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
             # The settings of the step are not valid, so that there is no motion to describe.
             segments = ()
         steps.append(_described(number, section, segments, at_mm, bed, refusal))
+        timed += segments
         at_mm = steps[-1].to_mm
-    seconds = sum(step.seconds for step in steps)
-    frames = int(np.ceil(seconds * bed.rate_hz))
-    width, height = bed.size_px
-    return RecipeCheck(bed, tuple(steps), seconds, frames, frames * width * height * BYTES_PER_PX / 1e6)
+    frames, at_most = frames_of(timed, bed.rate_hz, bed.actuator.limits.settling_s)
+    megabytes = at_most * bed.size_px[0] * bed.size_px[1] * BYTES_PER_PX / 1e6
+    return RecipeCheck(bed, tuple(steps), sum(step.seconds for step in steps), frames, at_most, megabytes)
 
 
 def _described(

@@ -14,8 +14,9 @@ from fingervision.testbed.bed import Bed
 from fingervision.testbed.manual import manual_control
 from fingervision.testbed.run import step_executor
 from fingervision.testbed.run.controls import Controls
+from fingervision.testbed.run.motion_ratio import LARGEST_RATIO, MotionRatio
 from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
-from fingervision.testbed.run.plan import Plan, check_moves, plan
+from fingervision.testbed.run.plan import REST_FRAMES, Plan, check_moves, plan
 from fingervision.testbed.run.run_folder import BedRunFolder
 from fingervision.testbed.run.run_record import Counts, OnRow, RunRecord
 from fingervision.testbed.run.safety_monitor import Say, Watch
@@ -27,8 +28,6 @@ from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 
 # Number of frames that synchronise the clocks before anything moves; the last frames must show the fingers.
 FIRST_FRAMES = 75
-# A recorded run begins at rest.
-REST_FRAMES = 5
 # A stage that takes less than this share of the expected time is faster than commanded, because ramps only make a
 # motion longer. It is slower if the expected time is less than this share of what it takes, but for its settling time
 # and RAMP_S for each motion.
@@ -59,6 +58,7 @@ class Runner:
     watch: Watch
     on_progress: Progress
     _slots: list[dict[str, float]] = field(default_factory=list)
+    _warned: set[str] = field(default_factory=set)
 
     def follow(self, last: SampleRow) -> None:
         """Continue after the last row of an earlier run; must be called first."""
@@ -121,7 +121,11 @@ class Runner:
             words = f"Step {leg.step}: {leg.words}."
             record.event("leg", words, leg=number, step=leg.step, frame=record.counts.recorded)
             began_s, from_mm = watch.bed.clock.now_s() - watch.paused_s, watch.sight.position.newest
+            if watch.ratio is not None:
+                watch.ratio.begin()
             self._do(leg, number)
+            if watch.ratio is not None and watch.ratio.interval[1] < 1.0 / LARGEST_RATIO:
+                self._warn("small_motion", f"In step {leg.step}, {watch.ratio.words}, and whether the gripper is held.")
             if isinstance(leg.act, Go) and leg.act.frames is None:
                 moved_s += watch.bed.clock.now_s() - watch.paused_s - began_s
                 ramps_s += watch.bed.actuator.limits.settling_s + RAMP_S
@@ -141,12 +145,18 @@ class Runner:
         record.event("ended", f"{record.counts.recorded} frames were recorded.")
 
     def _warn_of_speed(self, event: str, moved_s: float, foreseen_s: float, why: str) -> None:
-        words = (
-            f"warning: the recorded motions took {moved_s:.3g} s, but should take {foreseen_s:.3g} s at the speeds of "
-            f"the recipe: the stage {why}. Run its contract tests; `fingervision bed check` prints their command line."
+        self._warn(
+            event,
+            f"The recorded motions took {moved_s:.3g} s, but should take {foreseen_s:.3g} s at the speeds of "
+            f"the recipe: the stage {why}. Run its contract tests; `fingervision bed check` prints their command line.",
         )
-        self.watch.say(words)
-        self.watch.record.event(event, words)
+
+    def _warn(self, event: str, words: str) -> None:
+        """Say and record a warning; each once in a run."""
+        if event not in self._warned:
+            self._warned.add(event)
+            self.watch.say(f"warning: {words[:1].lower()}{words[1:]}")
+            self.watch.record.event(event, words)
 
     def _first_leg(self) -> int:
         """Index of the first segment to execute: 0 with replay; without it, the segment that was interrupted."""
@@ -186,9 +196,7 @@ class Runner:
 
     def _rest(self, leg: int) -> None:
         """Record the pause at the start of a run, if the following segment is recorded continuously."""
-        following = self.plan.legs[leg].act if leg < len(self.plan.legs) else None
-        moves_on = isinstance(following, Swing | Close)
-        if moves_on or (isinstance(following, Go | Stand) and following.frames is None):
+        if leg < len(self.plan.legs) and self.plan.legs[leg].is_continuous:
             for _ in range(REST_FRAMES):
                 self.watch.see(record=True)
 
@@ -270,7 +278,8 @@ def run_recipe(
         left = max(sum(planned.seconds) * sight.rate_hz - len(folder.rows), 0.0)
         folder.needs_room(left, size_px)
         record = RunRecord(folder, lambda bed_s, at_once: sight.position.at(bed_s, at_once=at_once), on_row)
-        watch = Watch(bed, sight, record, controls or Controls(), recipe.below_force_n, say)
+        ratio = None if bed.replays or bed.model is None else MotionRatio(bed.model, bed.limits)
+        watch = Watch(bed, sight, record, controls or Controls(), recipe.below_force_n, say, ratio=ratio)
         runner = Runner(planned, watch, on_progress)
         if before:
             runner.follow(before[-1])

@@ -10,8 +10,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NoReturn
 
-import numpy as np
-
 from calib.measured_scale import Calibration
 from fingervision import __version__
 from fingervision.domain.errors import DataError, FingervisionError, OutputError
@@ -29,13 +27,11 @@ from fingervision.storage.simulation_table import write_simulation
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.motion.soft_limits import SoftLimits
+from fingervision.testbed.run.motion_ratio import inputs_within
 from fingervision.testbed.simulation.injected_effects import Hidden
 
 SAMPLES, SIMULATION, RECIPE, JOINED = "samples.csv", "simulation.csv", "recipe.toml", "joined.csv"
 KIND = "bed run"
-# Number of rows of simulation.csv, and its margin beyond the test bed's limits: readings in encoder steps may lie
-# beyond them.
-SIMULATED_ROWS, BEYOND_LIMITS_MM = 201, 0.06
 
 
 def digest_of(bed: Bed, hidden: Hidden) -> str:
@@ -46,8 +42,7 @@ def digest_of(bed: Bed, hidden: Hidden) -> str:
 
 def write_expected(path: Path, model: Model, limits: SoftLimits) -> None:
     """Write the gap that the model predicts within the test bed's limits."""
-    low_mm, high_mm = limits.lower_mm - BEYOND_LIMITS_MM, limits.upper_mm + BEYOND_LIMITS_MM
-    inputs = np.linspace(low_mm, high_mm, SIMULATED_ROWS)
+    inputs = inputs_within(limits)
     # The force is left out, because it depends on the object between the fingers, not only on the gripper.
     write_simulation(path, inputs, replace(model.respond(inputs), force_n=None))
 

@@ -10,7 +10,8 @@ from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.run.controls import Controls
-from fingervision.testbed.run.motion_segments import Close, Leg
+from fingervision.testbed.run.motion_ratio import LARGEST_RATIO, MotionRatio
+from fingervision.testbed.run.motion_segments import Close, Go, Leg
 from fingervision.testbed.run.run_record import RunRecord
 from fingervision.testbed.run.synchronised_acquisition import Look, Sight
 
@@ -44,6 +45,8 @@ class Watch:
         Segment that is being executed.
     paused_s : float
         Total duration of pauses.
+    ratio : MotionRatio or None
+        Comparison of the gap's motion with the model's; None without a model, or without a real part.
     """
 
     bed: Bed
@@ -54,6 +57,7 @@ class Watch:
     say: Say
     leg: Leg | None = None
     paused_s: float = 0.0
+    ratio: MotionRatio | None = None
 
     # Frames.
 
@@ -101,6 +105,10 @@ class Watch:
             self.record.lose()
         self.record.write()
         gap_mm = measured.gap_mm
+        if self.ratio is not None and gap_mm is not None and self.leg is not None and isinstance(self.leg.act, Go):
+            self.ratio.add(self.sight.position.at(look.exposed_s, at_once=True) or 0.0, gap_mm)
+            if self.ratio.interval[0] > LARGEST_RATIO:
+                raise DeviceError(f"The test bed must move as stated, but {self.ratio.words}. The motor was stopped.")
         if gap_mm is not None and gap_mm < self.bed.limits.gap_mm and not self._closes:
             raise LimitError(
                 f"The gap must stay above {self.bed.limits.gap_mm:g} mm, but is {gap_mm:.4f} mm at "

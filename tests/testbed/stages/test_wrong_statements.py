@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from fingervision.domain.errors import DeviceError
+from fingervision.storage.recipe_toml import read_recipe
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.actuators._single_axis import AxisSettings
 from fingervision.testbed.actuators.epics_motor import MotorRecord
@@ -15,10 +16,12 @@ from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.clocks.clock import VirtualClock
 from fingervision.testbed.manual import manual_control
+from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testbed.text_protocol.line import Line
 from fingervision.testbed.text_protocol.words import Exchange, Words, number_in
+from tests.testbed.simulated_beds import recipe_at, steps
 from tests.testbed.stages.emulators import Emulator, Invented, Kinesis, Zaber
-from tests.testbed.stages.stage_cases import CASES
+from tests.testbed.stages.stage_cases import CAMERA, CASES
 from tests.testbed.stages.test_stages import virtual_time
 from tests.testbed.stages.test_words import EXAMPLE, bed_with
 
@@ -52,6 +55,30 @@ def test_a_stage_faster_than_its_speed_has_other_units(
     with pytest.raises(DeviceError, match="Nothing was moved"):
         bed.actuator.move(0.0, 0.5)
     bed.close()
+
+
+@pytest.mark.parametrize("ratio", [25.4, 10.0, 0.1, 1.0])
+def test_units_that_command_and_report_alike_are_told_by_the_picture(
+    ratio: float, device: Invented, tmp_path: Path
+) -> None:
+    words, camera = EXAMPLE, CAMERA.replace("still_camera", "true_camera").replace("rate_hz = 100.0", "rate_hz = 25.0")
+    for key in ("per_mm = 1000", "mm_s = 1000"):
+        words = words.replace(key, key.replace("1000", f"{1000 * ratio:g}"))
+    path = bed_with(words, device, tmp_path)
+    path.write_text(path.read_text(encoding="utf-8") + camera, encoding="utf-8")
+    recipe, said = recipe_at(tmp_path, steps('kind = "move"\nto_mm = 0.4\nspeed_mm_s = 0.4')), list[str]()
+    bed = open_bed(str(path))
+    try:
+        run_recipe(read_recipe(recipe), bed, tmp_path / "run", say=said.append)
+        assert device.plant.at() == pytest.approx(0.4 * ratio)
+    except DeviceError as error:
+        said.append(str(error))
+        # Less than half of the way was gone.
+        assert device.plant.at() < 0.2 * ratio
+    bed.close()
+    asked = [float(found[1]) for found in map(re.compile(r"the gap moved (\S+) times").search, said) if found]
+    assert asked == ([] if ratio == 1.0 else [pytest.approx(ratio, rel=0.1)])
+    assert not device.plant.moves
 
 
 def test_a_word_for_motion_that_never_comes_is_no_rest(device: Invented, tmp_path: Path) -> None:
