@@ -82,7 +82,7 @@ gap_mm = {gap_mm}
         ),
         (
             'kind = "move"\nto_mm = 0.2\nspeed_mm_s = 0',
-            "speed_mm_s in line 6 of {path} must be greater than 0, but is 0.",
+            "speed_mm_s in line 6 of {path} must be greater than 0 mm/s, but is 0.",
         ),
         (
             'kind = "reference_slot"\nsize_mm = 40.0',

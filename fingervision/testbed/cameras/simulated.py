@@ -114,16 +114,27 @@ class SimulatedCamera:
     def next(self) -> SimulatedShot:
         """Wait for the next frame and return it; earlier frames that were not requested are lost."""
         while True:
-            device_s = self._exposure / self._rate_hz
-            exposed_s = self._own.bed_s(device_s)
-            rng = np.random.default_rng([self._seed, 4, abs(self._exposure)])
-            arrived_s = exposed_s + self.latency.least_s + self._jitter_s * float(rng.standard_exponential())
+            device_s, exposed_s, arrived_s = self._times_s()
             self._exposure += 1
             if arrived_s >= self._clock.now_s():
                 break
         self._clock.wait_until(arrived_s)
         self._index += 1
         return SimulatedShot(self._index - 1, self._exposure - 1, device_s, arrived_s, exposed_s, self.placed, self)
+
+    def ready(self, within_s: float) -> bool:
+        """Wait for the next frame, but no longer than a time; return whether it is there."""
+        arrived_s, until_s = self._times_s()[2], self._clock.now_s() + within_s
+        self._clock.wait_until(min(arrived_s, until_s))
+        return arrived_s <= until_s
+
+    def _times_s(self) -> tuple[float, float, float]:
+        """Time stamp, exposure and arrival of the next frame."""
+        device_s = self._exposure / self._rate_hz
+        exposed_s = self._own.bed_s(device_s)
+        rng = np.random.default_rng([self._seed, 4, abs(self._exposure)])
+        late_s = self.latency.least_s + self._jitter_s * float(rng.standard_exponential())
+        return device_s, exposed_s, exposed_s + late_s
 
     def place(self, placed: Placed) -> None:
         """Change the placement of the part."""

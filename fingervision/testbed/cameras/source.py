@@ -77,6 +77,11 @@ class SourceCamera:
         device_s = received.arrived_s if own_s is None else own_s
         return SourceShot(index, device_s, received.arrived_s, replace(received.item, index=index, time_s=device_s))
 
+    def ready(self, within_s: float) -> bool:
+        """Wait for the next frame, but no longer than a time; return whether `next` need not wait for it."""
+        with self._changed:
+            return bool(self._changed.wait_for(lambda: self._waiting or self._ended, within_s))
+
     def close(self) -> None:
         """Release the source."""
         self._source.close()

@@ -14,8 +14,9 @@ SIMULATED = True
 
 
 def build(section: Any, context: Any) -> simulated.SimulatedCamera:
-    """Build the simulated camera before a gripper on the one stage that is plugged in."""
-    (device,) = Emulator.plugged
+    """Build the simulated camera before a gripper on the stage of the test bed."""
+    bed = (context.folder / "bed.toml").read_text(encoding="utf-8")
+    device = next(each for each in Emulator.plugged if each.port in bed)
     true_mm, now_s = np.vectorize(device.plant.was_at, otypes=[float]), context.clock.now_s
     began_s = now_s()
     motion = Motion(true_mm, now_s, lambda: len(device.heard), list, lambda: began_s)
