@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import column_name
 from fingervision.models.place_answers import AS_DRAWN, LinearAnswer, PlaceAnswers, PlaceChanges
 
@@ -182,8 +181,3 @@ def known_channels(answers: PlaceAnswers, measured: Sequence[str]) -> dict[str, 
     """Match the channels of a table to names in the drawing; only letters, digits and `_` are compared."""
     own = {column_name(name): name for name in answers.channels}
     return {name: own[column_name(name)] for name in measured if column_name(name) in own}
-
-
-def answers_of(mechanism: Mechanism) -> PlaceAnswers:
-    """Build the predictions of a drawing."""
-    return PlaceAnswers(mechanism)

@@ -107,7 +107,7 @@ def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[
 
     def left(beside: Array) -> Array:
         """Squared lengths of the parts of columns orthogonal to run offsets and to the columns `beside`; shape (k,)."""
-        moved = beside - offsets.design @ (metric @ (offsets.design.T @ beside))
+        moved = offsets.beside(beside, metric)
         rest = columns - beside @ (np.linalg.pinv(beside.T @ moved) @ (moved.T @ columns))
         shared = offsets.design.T @ rest
         return np.asarray(np.einsum("ij,ij->j", rest, rest) - np.einsum("ij,ij->j", shared, metric @ shared))
@@ -150,11 +150,8 @@ def foretells_other_passes(problem: Problem, explanation: Explanation, position_
         return True
     offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
 
-    def beside_offsets(columns: Array) -> Array:
-        return np.asarray(columns - offsets.design @ (metric @ (offsets.design.T @ columns)))
-
-    columns = beside_offsets(problem.whitener.columns(position_map.columns_mm)[0])
-    residual = beside_offsets(explanation.residual)
+    columns = offsets.beside(problem.whitener.columns(position_map.columns_mm)[0], metric)
+    residual = offsets.beside(explanation.residual, metric)
     rows = np.tile(part, residual.size // part.size)
     each = [
         (columns[rows == number].T @ columns[rows == number], columns[rows == number].T @ residual[rows == number])

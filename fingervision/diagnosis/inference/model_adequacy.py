@@ -69,7 +69,7 @@ def harmonics(problem: Problem, best: Explanation) -> Harmonics:
             waves.append(moved.stacked(best.values) - base)
     columns = problem.whitener.columns(np.stack(waves, axis=1))[0]
     metric = problem.offsets.metric(best.sigma_mm)
-    bent = columns - problem.offsets.design @ (metric @ (problem.offsets.design.T @ columns))
+    bent = problem.offsets.beside(columns, metric)
     taken = bent.T @ best.residual
     share = np.linalg.pinv(columns.T @ bent) @ taken
     sizes = LARGEST * np.hypot(share[0::2], share[1::2])
@@ -124,11 +124,11 @@ def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) ->
     """
     offsets, metric = problem.offsets, problem.offsets.metric(found.sigma_mm)
     columns = basis.columns
-    dot = columns.T @ (found.residual - offsets.design @ (metric @ (offsets.design.T @ found.residual)))
+    dot = columns.T @ offsets.beside(found.residual, metric)
     norm = basis.beside_offsets(metric)
     moves = np.hstack([tangents(problem, found), taken]) if found.names else taken
     if moves.shape[1]:
-        bent = moves - offsets.design @ (metric @ (offsets.design.T @ moves))
+        bent = offsets.beside(moves, metric)
         cross = bent.T @ columns
         inverse = np.linalg.pinv(moves.T @ bent)
         dot = dot - cross.T @ (inverse @ (bent.T @ found.residual))
@@ -213,7 +213,7 @@ def _differs_by_rounding(problem: Problem, found: Explanation, base: Explanation
         return False
     moves = np.hstack([derivatives(problem, base), shapes]) if base.names else shapes
     whitened, metric = problem.whitener.columns(moves)[0], problem.offsets.metric(base.sigma_mm)
-    bent = _beside(problem.offsets.design, metric, whitened)
+    bent = problem.offsets.beside(whitened, metric)
     size = np.linalg.pinv(whitened.T @ bent) @ (bent.T @ base.residual)
     differs = problem.chain.stacked(base.values) + moves @ size - problem.chain.stacked(found.values)
     return below_the_input(problem, _size_in_runs(problem, differs[: history.input_mm.size]))
@@ -233,24 +233,19 @@ def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) ->
     this difference is not another explanation. A ramp over time in addition to an offset has the shape of warming; in
     addition to a map of position errors, every function of position counts as a line.
     """
-    metric, design = problem.offsets.metric(found.sigma_mm), problem.offsets.design
+    offsets, metric = problem.offsets, problem.offsets.metric(found.sigma_mm)
     norm = np.maximum(basis.beside_offsets(metric), 1e-12)
     shapes = own_shapes(problem, found)
     lines = np.stack([np.zeros(basis.columns.shape[0]), *(s for s in shapes if is_a_line(problem, s))], axis=1)
-    inverse = np.linalg.pinv(lines.T @ _beside(design, metric, lines))
-    cross = basis.columns.T @ _beside(design, metric, lines)
+    inverse = np.linalg.pinv(lines.T @ offsets.beside(lines, metric))
+    cross = basis.columns.T @ offsets.beside(lines, metric)
     left = norm - np.einsum("ij,ij->i", cross @ inverse, cross)
     own: Flags = np.asarray(left <= (1.0 - SAME_SHAPE**2) * norm)
     for shape in shapes:
-        moved = _beside(design, metric, shape - lines @ (inverse @ (lines.T @ _beside(design, metric, shape))))
+        moved = offsets.beside(shape - lines @ (inverse @ (lines.T @ offsets.beside(shape, metric))), metric)
         if float(shape @ moved) > 0.0:
             own |= (basis.columns.T @ moved) ** 2 > SAME_SHAPE**2 * left * float(shape @ moved)
     return own
-
-
-def _beside(design: Array, metric: Array, columns: Array) -> Array:
-    """Parts of whitened columns that are orthogonal to the runs' offsets and to other random effects."""
-    return np.asarray(columns - design @ (metric @ (design.T @ columns)), dtype=np.float64)
 
 
 def own_shapes(problem: Problem, explanation: Explanation) -> list[Array]:

@@ -88,7 +88,7 @@ def linear_thresholds(
         shared = offsets.design.T @ columns
         prior = np.array([sigma[c] for c in range(offsets.channels) for _ in range(offsets.runs)])
         noise += offsets.design[:, : prior.size] @ (prior[:, None] * rng.standard_normal((prior.size, LINEAR_DRAWS)))
-        noise -= offsets.design @ (metric @ (offsets.design.T @ noise))
+        noise = offsets.beside(noise, metric)
         norm = np.einsum("ij,ij->j", columns, columns) - np.einsum("ij,ij->j", shared, metric @ shared)
     else:
         norm = np.einsum("ij,ij->j", kept, kept)

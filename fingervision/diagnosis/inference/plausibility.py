@@ -273,7 +273,7 @@ def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Ex
         own = _without(column, whitened, offsets, metric)
         norm = offsets.squared(own, metric)
         if norm > LEAST_NORM * max(float(column @ column), 1e-300):
-            moved = own - offsets.design @ (metric @ (offsets.design.T @ own))
+            moved = offsets.beside(own, metric)
             coefficient = float(moved @ residual) / norm
             if best is None or coefficient**2 * norm > best[0]:
                 best = coefficient**2 * norm, coefficient * width
@@ -294,5 +294,5 @@ def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Ex
 
 def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) -> Array:
     """Project whitened values off the given columns; the shape is unchanged."""
-    moved = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
+    moved = offsets.beside(columns, metric)
     return np.asarray(values - columns @ np.linalg.lstsq(moved.T @ columns, moved.T @ values, rcond=1e-10)[0])

@@ -12,7 +12,12 @@ from scipy.interpolate import CubicSpline
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.diagnosis.inference.random_effect import estimated_coefficients, normal_equations
+from fingervision.diagnosis.inference.random_effect import (
+    RandomEffect,
+    estimated_coefficients,
+    gains_by_size,
+    normal_equations,
+)
 from fingervision.domain.effect import Array, History, InputPath
 from fingervision.domain.parameter import Estimate
 from fingervision.effects.position_error_map import EFFECT, covariance, curve_values, without_line
@@ -38,8 +43,8 @@ SLOPE_STEP = 1e-3
 """Step, as a share of the range, for the derivative of the prediction with respect to the input."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PositionMap:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PositionMap(RandomEffect):
     """A map of position errors of the stage as a random effect.
 
     Parameters
@@ -48,28 +53,14 @@ class PositionMap:
         Inputs at the nodes of the curve.
     root_mm : ndarray of float, shape (k, k)
         Matrix that converts independent standard normal numbers to the curve at the nodes.
-    columns_mm : ndarray of float, shape (channels * n, k)
-        Change of the prediction per unit of each of these numbers.
     rms_mm, length_mm : Estimate
         Root mean square of the curve (before estimation, of the process), and correlation length of the process.
-    price : float
-        Penalty on the scale of chi-square: logarithm of the determinant, and of the choice of size and length.
-    coefficients : ndarray of float, shape (k,)
-        Estimates of the standard normal numbers.
     """
 
     nodes_mm: Array
     root_mm: Array
-    columns_mm: Array
     rms_mm: Estimate
     length_mm: Estimate
-    price: float
-    coefficients: Array
-
-    @property
-    def fitted_mm(self) -> Array:
-        """Change of the prediction by the estimated curve, to first order; shape (channels * n,)."""
-        return np.asarray(self.columns_mm @ self.coefficients, dtype=np.float64)
 
     @property
     def curve_mm(self) -> Array:
@@ -149,12 +140,7 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
     for i, length in enumerate(lengths):
         root = straightened @ np.linalg.cholesky(covariance(nodes_mm, length) + 1e-9 * np.eye(nodes_mm.size))
         roots.append(root)
-        value, vector = np.linalg.eigh(root.T @ gram @ root)
-        value = np.maximum(value, 0.0)
-        share = (vector.T @ (root.T @ aim)) ** 2
-        for j, size in enumerate(sizes):
-            load = 1.0 + size**2 * value
-            gains[i, j] = float(np.sum(size**2 * share / load) - np.sum(np.log(load)))
+        gains[i] = gains_by_size(root.T @ gram @ root, root.T @ aim, sizes)
     i, j = divmod(int(np.argmax(gains)), SIZES)
     # The penalty is that of two fitted numbers, size and length.
     choice = 2.0 * float(np.log(max(2, problem.measured.size)))

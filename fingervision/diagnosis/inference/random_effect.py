@@ -37,7 +37,7 @@ def normal_equations(problem: Problem, explanation: Explanation, raw_mm: Array) 
     """
     offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
     white = problem.whitener.columns(raw_mm)[0]
-    beside = white - offsets.design @ (metric @ (offsets.design.T @ white))
+    beside = offsets.beside(white, metric)
     return white.T @ beside, beside.T @ explanation.residual
 
 
@@ -72,31 +72,57 @@ SIZES = np.geomspace(1e-4, 0.2, 34)
 """Standard deviations of the gain that are tried; runs that differ by more than a fifth are not one experiment."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RunGains:
-    """Gains of the runs as a random effect.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RandomEffect:
+    """A random effect with its estimated coefficients.
 
     Parameters
     ----------
-    columns_mm : ndarray of float, shape (channels * n, runs)
-        Change of the prediction per standard deviation of each run's gain.
-    sd : float
-        Standard deviation of the gain from run to run, as a ratio.
+    columns_mm : ndarray of float, shape (channels * n, k)
+        Change of the prediction per standard deviation of each coefficient.
     price : float
-        Penalty on the scale of chi-square: logarithm of the determinant, and of the choice of `sd`.
-    coefficients : ndarray of float, shape (runs,)
-        Estimated gains in units of `sd`.
+        Penalty on the scale of chi-square: logarithm of the determinant, and of the choice of the columns' size.
+    coefficients : ndarray of float, shape (k,)
+        Estimated coefficients, in standard deviations.
     """
 
     columns_mm: Array
-    sd: float
     price: float
     coefficients: Array
 
     @property
     def fitted_mm(self) -> Array:
-        """Change of the prediction by the estimated gains; shape (channels * n,)."""
+        """Change of the prediction by the estimated coefficients, to first order; shape (channels * n,)."""
         return np.asarray(self.columns_mm @ self.coefficients, dtype=np.float64)
+
+
+def gains_by_size(gram: Array, aim: Array, sizes: Array) -> Array:
+    """Reduction of -2 log of the marginal likelihood by a random effect, for each size of its columns; shape (sizes,).
+
+    Parameters
+    ----------
+    gram, aim : ndarray of float, shape (k, k) and (k,)
+        Normal equations of columns of unit size.
+    sizes : ndarray of float, shape (sizes,)
+        Standard deviations of the coefficients.
+    """
+    value, vector = np.linalg.eigh(gram)
+    value, share = np.maximum(value, 0.0), (vector.T @ aim) ** 2
+    load = 1.0 + sizes[:, None] ** 2 * value
+    return np.asarray(np.sum(sizes[:, None] ** 2 * share / load - np.log(load), axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RunGains(RandomEffect):
+    """Gains of the runs as a random effect, with one coefficient for each run.
+
+    Parameters
+    ----------
+    sd : float
+        Standard deviation of the gain from run to run, as a ratio.
+    """
+
+    sd: float
 
     @property
     def scatter_mm(self) -> Array:
@@ -149,14 +175,11 @@ def likeliest_gains(problem: Problem, explanation: Explanation) -> tuple[RunGain
         # A gain acts about the mean of its run, because its remaining part is an offset.
         raw[run, column] = gap_mm[run] - gap_mm[run].mean()
     gram, aim = normal_equations(problem, explanation, raw)
-    value, vector = np.linalg.eigh(gram)
-    value, share = np.maximum(value, 0.0), (vector.T @ aim) ** 2
-    load = 1.0 + SIZES[:, None] ** 2 * value
-    gained = np.sum(SIZES[:, None] ** 2 * share / load - np.log(load), axis=1)
+    gained = gains_by_size(gram, aim, SIZES)
     best = int(np.argmax(gained))
     size = float(SIZES[best])
     choice = float(np.log(max(2, problem.measured.size)))
-    inner = np.eye(value.size) + size**2 * gram
+    inner = np.eye(aim.size) + size**2 * gram
     found = RunGains(
         columns_mm=raw * size,
         sd=size,

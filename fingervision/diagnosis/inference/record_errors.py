@@ -204,7 +204,7 @@ def with_record_errors(
     columns = columns[:, smooth]
     listed = [entry for entry, kept in zip(listed, smooth.tolist(), strict=True) if kept]
     offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
-    bent = columns - offsets.design @ (metric @ (offsets.design.T @ columns))
+    bent = offsets.beside(columns, metric)
     starts = np.array([parameter.run is not None for _, parameter in listed])
     normal = columns.T @ bent + np.diag(np.where(starts, 1.0 / START_VARIANCE, 0.0))
     estimate = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)[~starts] @ bent.T

@@ -58,12 +58,12 @@ class Signatures:
             Columns that are refitted at the same time and projected out.
         """
         shared = offsets.design.T @ self.columns
-        weighted = residual - offsets.design @ (metric @ (offsets.design.T @ residual))
+        weighted = offsets.beside(residual, metric)
         dot = self.columns.T @ weighted
         norm = self._squares - np.einsum("ij,ij->j", shared, metric @ shared)
         full = norm.copy()
         if along is not None and along.shape[1]:
-            moved = along - offsets.design @ (metric @ (offsets.design.T @ along))
+            moved = offsets.beside(along, metric)
             cross = moved.T @ self.columns
             inverse = np.linalg.pinv(along.T @ moved)
             dot = dot - cross.T @ (inverse @ (moved.T @ residual))

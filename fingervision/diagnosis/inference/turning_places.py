@@ -171,7 +171,7 @@ def _normal_equations(data: Observations, problem: Problem, explanation: Explana
     values = problem.whitener.columns(derivatives(problem, explanation))[0]
     offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
     every = np.hstack([places, values, explanation.residual[:, None]])
-    beside = every - offsets.design @ (metric @ (offsets.design.T @ every))
+    beside = offsets.beside(every, metric)
     count, normal = places.shape[1], every.T @ beside
     own, cross, rest = normal[:count, :count], normal[:count, count:-1], normal[count:-1, count:-1]
     removed = cross @ np.linalg.pinv(rest, rcond=1e-12, hermitian=True)

@@ -100,6 +100,10 @@ class RunOffsets:
         self._metrics[sigma_mm] = found
         return found
 
+    def beside(self, whitened: Array, metric: Array) -> Array:
+        """Parts of whitened columns that the offsets of a metric leave; shape of the columns."""
+        return np.asarray(whitened - self.design @ (metric @ (self.design.T @ whitened)))
+
     def squared(self, whitened: Array, metric: Array) -> float:
         """Squared length of a whitened column, with the offsets of a metric fitted."""
         shared = self.design.T @ whitened

@@ -126,7 +126,7 @@ def _of_input(answered: Answer, change_mm: Array) -> tuple[float, float]:
     metric = offsets.metric((0.0,) * offsets.channels)
     columns = whitener.columns(np.stack([(high - low) / (2.0 * reach), change_mm], axis=1))[0]
     slope, change = columns.T
-    bent = slope - offsets.design @ (metric @ (offsets.design.T @ slope))
+    bent = offsets.beside(slope, metric)
     normal = float(bent @ slope)
     return float(bent @ change) / normal, normal**-0.5
 
