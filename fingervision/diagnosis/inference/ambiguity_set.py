@@ -4,7 +4,7 @@ from math import comb
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
 
@@ -31,9 +31,6 @@ STRONG = 6.0
 which is no strong evidence (2 ln 20; Kass & Raftery 1995, doi:10.1080/01621459.1995.10476572)."""
 IDLE_SHARE = 0.3
 """Share of the best explanation's gain below which another explanation counts as explaining nothing."""
-PLAIN = 50.0
-"""Gain in chi-square above which a richer formula is considered proven, even if it is a small share of the explained
-part."""
 
 
 def ambiguity_set(
@@ -77,7 +74,7 @@ def ambiguity_set(
         close = distance < INDISTINGUISHABLE and not idle and worse < admissible
         # An explanation with more effects always fits better, whatever is true.
         unrefuted = len(other.names) <= len(best.names) and worse < _least_refuted(distance)
-        if close or unrefuted or (contested and not idle) or _simpler_form(problem, nothing, best, other):
+        if close or unrefuted or (contested and not idle):
             members.append(other)
 
     for other in pool:
@@ -95,22 +92,6 @@ def ambiguity_set(
 def _net(nothing: Explanation, explanation: Explanation) -> float:
     """Gain in chi-square over the model without effects, minus the gain that noise alone would give on average."""
     return nothing.score - explanation.score - 2.0 * explanation.free
-
-
-def _simpler_form(problem: Problem, nothing: Explanation, best: Explanation, other: Explanation) -> bool:
-    """Whether the best explanation may fit better only because its richer formula includes the other explanation.
-
-    An example is a delay and a well-damped resonance, both of which round corners: the formula of a delay is inexact
-    where the stage reverses between two samples. A difference in chi-square that the inexactness of formulas can cause
-    is attributed to it; a larger difference is evidence for the richer formula.
-    """
-    worse = other.score - best.score
-    return (
-        len(other.names) == len(best.names)
-        and other.free < best.free
-        and worse < min(PLAIN, SMALL_SHARE**2 * (nothing.score - best.score))
-        and _imitation(problem, other, best, best.sigma_mm).score < INDISTINGUISHABLE
-    )
 
 
 def _least_refuted(distance: float) -> float:

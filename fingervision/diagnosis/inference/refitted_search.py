@@ -77,11 +77,10 @@ def refitted_search(
     likelier = likelier_interpolation(state.data, state.found.problem, state.found.best)
     if likelier is not state.data:
         state = look.again(likelier)
-    within = state.data
     state = _over_the_ends(state, look)
     state = beside_gains(state, look)
     if NAME not in without:
-        state = _at_the_ends(beside_map(state, look), within, look)
+        state = beside_map(state, look)
     state = _common_offset(state, look)
     return _settled(_beside_drawing(state, look), look)
 
@@ -95,26 +94,6 @@ def _over_the_ends(state: Searched, look: Look) -> Searched:
     tried = [found.best, found.nearest, *_with_memory(found)]
     straight = min(e.score for e in [found.nothing, *tried])
     return look.again(data) if _refitted_score(found, data, tried) < straight - LEAST_GAIN else state
-
-
-def _at_the_ends(state: Searched, within: Observations, look: Look) -> Searched:
-    """Search again along the path within the ends, if overshoots are less probable beside the map than without it.
-
-    A map of position errors that is larger than the play hides where the stage turned. For example, overshoots that had
-    been assumed before the map was found were cut off again by end stops at both outermost targets.
-    """
-    data, found = state.data, state.found
-    if data.position_map is None or not found.best.names or within.chain.path is data.chain.path:
-        return state
-    overshoots = set(within.with_overshoots().notes) - set(within.notes)
-    notes = tuple(words for words in data.notes if words not in overshoots)
-    inside = replace(data, chain=replace(data.chain, path=within.chain.path), notes=notes)
-    along, best = replace(found.problem, chain=inside.chain), found.best
-    fewer = [{n: v for n, v in best.values.items() if n != left_out} for left_out in best.names]
-    tried = [fit(along, tuple(values), values, iterations=20) for values in (best.values, *fewer) if values]
-    rows = max(2, int(found.problem.measured.size))
-    likeliest = min(tried, key=lambda e: e.bic(rows))
-    return look.again(inside, likeliest) if likeliest.bic(rows) < best.bic(rows) - LEAST_GAIN else state
 
 
 def _with_memory(found: Findings) -> list[Explanation]:
