@@ -64,8 +64,9 @@ WIDER_INSIDE = 0.02
 # Rate of false alarms of the score test, and least information of a direction as a share of the largest.
 FALSE_ALARMS, LEAST_TOLD = 1e-3, 1e-3
 # Extent of the table of the edge spread function in the largest length of the optics and in pixels, and its spacing:
-# linear interpolation errs by 1e-4.
-TABLE_SIGMAS, TABLE_EXTRA_PX, TABLED_PX = 5.0, 1.0, 0.05
+# linear interpolation errs by 1e-4. A step of a fit may try optics of any width (ln px): what is broader than the
+# profile is cut off.
+TABLE_SIGMAS, TABLE_EXTRA_PX, TABLED_PX, MOST_TABLED = 5.0, 1.0, 0.05, 3.0
 # Numbers of unknowns: common to all edges (see `FamilyFit`), and of each edge (position, both plateaus as
 # levels, slopes of both, ln of its own sigma over the common one).
 SHARED, OWN = 5, 6
@@ -656,7 +657,8 @@ def _tabulated_steps(
 ) -> Floats:
     """Sum of steps at these distances from the edges, by a table of the edge spread function for each set of optics."""
     every, which = np.unique(shared, axis=0, return_inverse=True)
-    end = TABLE_EXTRA_PX + TABLE_SIGMAS * float(np.exp(every[:, 0].max() + np.maximum(every[:, [1, 4]].max(), 0.0)))
+    widest = float(np.exp(min(every[:, 0].max() + max(every[:, [1, 4]].max(), 0.0), MOST_TABLED)))
+    end = TABLE_EXTRA_PX + TABLE_SIGMAS * widest
     x = np.linspace(-end, end, 2 * round(end / TABLED_PX) + 1)
     one = np.ones((len(every), x.size))
     tables = _step(x * one, one, every[:, :, None], one)

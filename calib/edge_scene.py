@@ -137,15 +137,15 @@ _SHADOW = (
     ),
 )
 
-NOTHING = Scene("", _nothing, (), (), (((), 0.0, 0.0),), 0.7)
+NOTHING = Scene("", _nothing, (), (), (((), 0.0, 0.0),), 0.72)
 # Prior probabilities: one recording in ten shows a wall (thick parts), a shadow, or a bright line (edges that are
-# chamfered or polished).
+# chamfered or polished); a chamfer that is evenly bright up to the edge on all sides is rare.
 SCENES = (
     Scene("wall", _wall(lambda side, is_outer: np.where(is_outer, 0.0, 1.0)), *_INNER_WALL, 0.06),
     Scene("wall", _wall(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02),
     Scene("wall", _wall(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02),
-    Scene("glare", _line, *_LINE, 0.05),
-    Scene("glare", _band, *_BAND, 0.05),
+    Scene("glare", _line, *_LINE, 0.06),
+    Scene("glare", _band, *_BAND, 0.02),
     Scene("shadow", _shadow(_QUANTILES), *_SHADOW, 0.05),
     Scene("shadow", _shadow(-np.log1p(-_QUANTILES)), *_SHADOW, 0.05),
 )

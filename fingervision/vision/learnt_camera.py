@@ -48,6 +48,8 @@ LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
 # Share of a curve's displacement of an edge that is added to the uncertainty for curves of no family: their error in
 # recordings of log, film and S-curves (tests/benchmarks/unknown_cameras.py).
 FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15}
+# Probability below which nothing is beside the edges is the less probable case, and of a rival that still counts.
+EVEN, LEAST_RIVAL = 0.5, 1e-3
 REMEDY = "calibrate with bars of three widths, give the curve with --response, or switch the picture profile off"
 NO_FLANKS = (
     "The camera's response could not be learnt, because no straight flank of a finger shows both its plateaus "
@@ -112,8 +114,10 @@ def learnt_from_profiles(
         return _not_learnt(prior, SHARPENED.format(share=overshoot), 1.0)
     assumed = prior.response.curve
     fits, misfit = _fitted(profiles, coding, assumed.name if assumed.name in CURVES else "")
-    if beside := _with_scenes(fits, wide, coding):
-        fits, misfit = beside, _misfit(beside)
+    scenes, bare = _with_scenes(fits, wide, coding)
+    if bare < EVEN:
+        fits, misfit = scenes, _misfit(scenes)
+        scenes = []
     if misfit > MOST_MISFIT:
         return _not_learnt(prior, MISFIT.format(misfit=misfit), 1.0)
     best = fits[0]
@@ -126,20 +130,27 @@ def learnt_from_profiles(
         discrepancy=CameraQuantity(max(misfit, 1.0) * MODEL_ERROR[coding], None, Origin.LEARNT),
     )
     if not prior.response.is_known:
-        camera = _with_response(camera, fits, coding)
+        camera = _with_response(camera, fits, scenes, coding)
     if camera.response.curve is assumed and best.scene is not NOTHING:
         same = [fit for fit in fits if fit.family.name == assumed.name]
         camera = replace(camera, beside=beside_edges(same, wide) if same else None)
     return camera
 
 
-def _with_response(camera: CameraModel, fits: Sequence[FamilyFit], coding: Coding) -> CameraModel:
-    """Camera with the response of the fits."""
+def _with_response(
+    camera: CameraModel, fits: Sequence[FamilyFit], scenes: Sequence[FamilyFit], coding: Coding
+) -> CameraModel:
+    """Camera with the response of the fits; less probable ones with something beside the edges widen what is open."""
     assumed = camera.response.curve
     if coding is Coding.INTERFRAME:
         # The response stays linear, but another one is as probable (two values, JCGM 100:2008, 4.3.9).
         return _not_learnt(camera, HIDDEN, 1.0 - LINEAR_PRIOR)
     response = _response(fits, coding)
+    rivals = zip(scenes, probabilities(scenes), strict=True) if scenes else ()
+    others = [
+        OtherResponse(fit.response(), float(p)) for fit, p in rivals if p > LEAST_RIVAL and fit.scene is not NOTHING
+    ]
+    response = replace(response, others=(*response.others, *others))
     if response.curve.white != assumed.white:  # a video of studio range stays clipped at its white
         response = replace(response, curve=replace(response.curve, white=assumed.white))
     return replace(camera, response=response)
@@ -169,18 +180,20 @@ def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[l
     return fits, misfit
 
 
-def _with_scenes(fits: Sequence[FamilyFit], wide: Sequence[EdgeProfile], coding: Coding) -> list[FamilyFit]:
-    """Fits with what may stand beside the edges; empty if they explain no more than tone curves and optics."""
+def _with_scenes(
+    fits: Sequence[FamilyFit], wide: Sequence[EdgeProfile], coding: Coding
+) -> tuple[list[FamilyFit], float]:
+    """Fits with what may stand beside the edges, and the probability of nothing; none if that is surely so."""
     # A tone curve with free parameters imitates what stands beside the edges.
     if not can_tell_beside(wide):
-        return []
+        return [], 1.0
     if not fits[0].parameters.size and not is_more_beside(wide, MODEL_ERROR[coding], fits[0].family):
-        return []
+        return [], 1.0
     always = [family("linear"), family("srgb")]
     others = [fit.family for fit in fits if fit.family not in always]
     found = fit_scenes(wide, DISCREPANCY[coding], always, others)
     bare = sum(float(p) for p, fit in zip(probabilities(found), found, strict=True) if fit.scene is NOTHING)
-    return [] if bare > SURE or _misfit(found) > MOST_MISFIT else found
+    return ([], 1.0) if bare > SURE or _misfit(found) > MOST_MISFIT else (found, bare)
 
 
 def _misfit(fits: Sequence[FamilyFit]) -> float:

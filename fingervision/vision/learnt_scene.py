@@ -16,8 +16,8 @@ from fingervision.vision.flank_profiles import Seen, flank_profiles
 Floats = NDArray[np.float64]
 
 # Standard deviation of a real edge about the best model, smooth over a pixel, as a share of its contrast: optics
-# (0.003) with what real walls, lines and shadows differ from the models (0.004); JPEG of quality 85; H.264.
-DISCREPANCY = {Coding.LOSSLESS: 0.005, Coding.INTRAFRAME: 0.007, Coding.INTERFRAME: 0.012}
+# (0.003) with what real walls, lines and shadows differ from the models; JPEG of quality 85; H.264.
+DISCREPANCY = {Coding.LOSSLESS: 0.004, Coding.INTRAFRAME: 0.006, Coding.INTERFRAME: 0.012}
 # Extent of the profiles beyond the blur (pixels): the light comes back within this distance beside most shadows.
 BESIDE_PX = 12.0
 # Share of a displacement on the straight flanks by which that at the measuring point may differ: it may lie on a
