@@ -25,6 +25,7 @@ SETTINGS = {
     "image_scrapers": ("generate.gallery.figures_of",),
     "download_all_examples": False,
     "show_memory": False,
+    "write_computation_times": False,  # its page loads scripts from another host
     "capture_repr": (),
     "within_subsection_order": "FileNameSortKey",
 }

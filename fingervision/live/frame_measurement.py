@@ -9,6 +9,7 @@ from fingervision.domain.camera import CameraModel, Origin
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.live.choices import Choices
+from fingervision.live.run_folder import RunFolder
 from fingervision.measuring.camera_learning import WANTED, camera_of
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.sound_picture import SoundPictures
@@ -29,19 +30,26 @@ class LiveCamera:
     """
 
     def __init__(self, tell: Callable[[str], None] = lambda words: None) -> None:
-        self._tell = tell
+        self._tell, self._told = tell, ""
         self._key: tuple[object, object] = (None, None)
         self._frames: list[Frame] = []
         self._learning: Future[CameraModel] | None = None
         self._camera: CameraModel | None = None
 
-    def used(self, settings: Settings, task: Task) -> Settings:
-        """Settings with the camera as far as it is known; another scale or response starts again."""
+    def used(self, settings: Settings, task: Task, run: RunFolder | None) -> Settings:
+        """Settings with the camera as far as it is known; another scale or response starts again.
+
+        A run learns its camera from its own frames, and the view takes it over.
+        """
         if self._key[0] is not task.scale or self._key[1] is not task.response:
             self._key, self._frames, self._learning, self._camera = (task.scale, task.response), [], None, None
-        if self._learning is not None and self._learning.done():
-            self._camera, self._learning = self._learning.result(), None
-            self._tell(_in_words(self._camera))
+        if run is not None:
+            self._frames, self._learning = [], None
+            if run.camera is not None and run.camera is not self._camera:
+                self._know(run.camera)
+        elif self._learning is not None and self._learning.done():
+            camera, self._learning = self._learning.result(), None
+            self._know(camera)
         return settings if self._camera is None else replace(settings, camera=self._camera)
 
     def add(self, frame: Frame, settings: Settings, task: Task) -> None:
@@ -54,6 +62,13 @@ class LiveCamera:
             pool = ThreadPoolExecutor(1, "camera")
             self._learning = pool.submit(camera_of, frames, settings, task.scale)
             pool.shutdown(wait=False)
+
+    def _know(self, camera: CameraModel) -> None:
+        self._camera = camera
+        words = "" if camera.response.is_known else _in_words(camera)
+        if words and words != self._told:
+            self._told = words
+            self._tell(words)
 
 
 def _in_words(camera: CameraModel) -> str:
@@ -110,9 +125,11 @@ class FrameMeasurement:
     ) -> None:
         self._frame_size_px, self._files, self._fingers_are_dark = frame_size_px, files, fingers_are_dark
         self._pictures, self._camera = SoundPictures(), LiveCamera(tell)
+        self.settings: Settings | None = None
+        """Settings with which the last frame was measured."""
 
     def measured(
-        self, item: Frame | LostFrame, choices: Choices
+        self, item: Frame | LostFrame, choices: Choices, run: RunFolder | None = None
     ) -> tuple[Frame | LostFrame, GapMeasurement | NoGap | None, GapRow | None]:
         """Measure a frame.
 
@@ -122,6 +139,8 @@ class FrameMeasurement:
             The frame as received.
         choices : Choices
             Settings chosen by the user.
+        run : RunFolder or None
+            The run that is being recorded.
 
         Returns
         -------
@@ -135,18 +154,21 @@ class FrameMeasurement:
         task = choices.task
         if task is None:
             return item, None, None
-        found: GapMeasurement | NoGap | LostFrame = item if isinstance(item, LostFrame) else self._found(item, choices)
+        found: GapMeasurement | NoGap | LostFrame = (
+            item if isinstance(item, LostFrame) else self._found(item, choices, run)
+        )
         (row,) = RowMaker(task.scale, self._frame_size_px).rows((Result(item.index, item.time_s, found),))
         if isinstance(found, LostFrame):
             return found, None, row
         return item, found, row
 
-    def _found(self, frame: Frame, choices: Choices) -> GapMeasurement | NoGap | LostFrame:
+    def _found(self, frame: Frame, choices: Choices, run: RunFolder | None) -> GapMeasurement | NoGap | LostFrame:
         assert choices.task is not None  # noqa: S101 - asked before
-        settings = self._camera.used(choices.task.settings_for(self._files)[0], choices.task)
+        settings = self._camera.used(choices.task.settings_for(self._files)[0], choices.task, run)
         if self._fingers_are_dark is not None:
             settings = replace(settings, fingers_are_dark=self._fingers_are_dark)
+        self.settings = settings
         outcome = self._pictures.judged(frame, measure_frame(frame, settings))
-        if isinstance(outcome, GapMeasurement):
+        if isinstance(outcome, GapMeasurement) and run is None:
             self._camera.add(frame, settings, choices.task)
         return outcome

@@ -9,14 +9,15 @@ from typing import Any
 
 from calib.measured_scale import Calibration
 from fingervision import __version__
+from fingervision.domain.camera import CameraModel
 from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import OwnPacket
 from fingervision.frames.source import Description
+from fingervision.live.run_table import Measured, RunTable
 from fingervision.measuring.task import Task
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.durable import remove_empty
-from fingervision.storage.gaps_csv import GapRow, GapsCsv
 from fingervision.storage.lost_frames import LOST, LostFrames
 from fingervision.storage.recorded_video import RecordedVideo
 from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, SCHEMA, VIDEO, RunFiles
@@ -29,18 +30,18 @@ OF_OUT = ("calibration_*.json", "snapshot_*.png", "live_gaps.csv", "settings.tom
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedFrame:
-    """One frame of a recording: its picture, its coded packets, and its measured row."""
+    """One frame of a recording: its picture, its coded packets, and what the live view has measured in it."""
 
     item: Frame | LostFrame
     packets: tuple[OwnPacket, ...]
-    row: GapRow
+    seen: Measured | None = None
 
 
 class RunFolder:
     """Writes the files of a run during the recording.
 
     Frames are passed to the operating system at once, and rows of the table within a second, so that at most one second
-    is lost if the process is killed.
+    is lost if the process is killed; the first rows once the camera is learnt from the first frames.
 
     Parameters
     ----------
@@ -68,11 +69,16 @@ class RunFolder:
         self._files.write_about(self._about, complete=False)
         if isinstance(task.scale, Calibration):
             write_calibration(task.scale, self.path / CALIBRATION)
-        self._gaps = GapsCsv(self.path / GAPS)
         self._lost = LostFrames(self.path / LOST)
         self._video = RecordedVideo(self.path / VIDEO, template)
+        self._table = RunTable(self.path / GAPS, replace(description, files=(self.path / VIDEO,)), task)
         self._last_s = 0.0
         self.event("recording", "Recording began.")
+
+    @property
+    def camera(self) -> CameraModel | None:
+        """Camera of the recording; None until it is learnt from the first frames."""
+        return self._table.camera
 
     @property
     def is_there(self) -> bool:
@@ -80,7 +86,7 @@ class RunFolder:
         return (self.path / EVENTS).exists()
 
     def add(self, frame: RecordedFrame) -> None:
-        """Write one frame: first the entry in lost.csv if the frame is lost, then its picture, then its row."""
+        """Write one frame: first the entry in lost.csv if the frame is lost, then its picture; its row follows."""
         if isinstance(frame.item, LostFrame):
             lost_at_s = self._video.time_s(frame.item, frame.packets)
             if lost_at_s is not None:
@@ -89,7 +95,7 @@ class RunFolder:
         if time_s is None:
             return
         self._last_s = time_s
-        self._gaps.add((replace(frame.row, frame=self.frames, time_s=time_s),))
+        self._table.add(replace(frame.item, index=self.frames, time_s=time_s), frame.seen)
         self.frames += 1
 
     def event(self, name: str, words: str) -> None:
@@ -101,7 +107,7 @@ class RunFolder:
         failure: FingervisionError | None = None
         with suppress(FingervisionError):
             self.event("stopped", why)
-        for end in (self._video.close, self._lost.close, self._gaps.close, self._files.close, self._finish):
+        for end in (self._video.close, self._lost.close, self._table.close, self._files.close, self._finish):
             try:
                 end()
             except FingervisionError as error:

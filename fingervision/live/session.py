@@ -371,7 +371,9 @@ class Session:
             self._frame_at_s = monotonic()
             self._interrupted = False
             came = arrival.item
-            item, outcome, row = self._measurement.measured(came, self.choices)
+            recorder = self._recorder
+            run = None if recorder is None else recorder.run
+            item, outcome, row = self._measurement.measured(came, self.choices, run)
             driven = arrival.driven or self.driven_at(came.time_s)
             if driven is not None and driven.run != self._run:
                 # The test bed takes no frames between two runs; this interruption is not counted as missing frames.
@@ -390,9 +392,10 @@ class Session:
                 return
             self.history.add(row)
             self.counts[row.status] += 1
-            recorder = self._recorder
             if recorder is not None:
-                recorder.add(RecordedFrame(item, arrival.packets, row))
+                settings = self._measurement.settings
+                seen = None if outcome is None or settings is None else (settings, outcome)
+                recorder.add(RecordedFrame(item, arrival.packets, seen))
                 if recorder.failure:
                     self._recorder = None
         self._overflow.say()

@@ -15,7 +15,7 @@ from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.frames.ahead import decoded_ahead
 from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.frame_range import frame_range
-from fingervision.frames.source import Description, FrameSource
+from fingervision.frames.source import Description
 from fingervision.measuring.beside_damage import confirmed_beside_damage
 from fingervision.measuring.camera_learning import learnt_first
 from fingervision.measuring.frame_sequence import Judged, in_sequence
@@ -39,6 +39,7 @@ from fingervision.vision.pipeline import Settings, measure_frame
 # look like two light fingers.
 
 Outcome = GapMeasurement | NoGap | LostFrame
+MeasureFrame = Callable[[Frame, Settings], GapMeasurement | NoGap]
 
 # Number of frames with a gap that decide by majority, and largest number of pixels that are stored until the decision.
 VOTERS, MOST_KEPT_PX = 15, 15_000_000
@@ -49,6 +50,7 @@ def one_polarity(
     settings: Settings,
     votes: Counter[str],
     is_stopped: Callable[[], bool] = lambda: False,
+    measure: MeasureFrame = measure_frame,
 ) -> Iterator[tuple[Frame | LostFrame, Outcome]]:
     """Measure frames in order, all with the polarity found in most of the first frames that have a measured gap.
 
@@ -63,6 +65,8 @@ def one_polarity(
     is_stopped : callable
         Called after every frame; if it returns True no more frames are read, and the frames measured so far are still
         yielded.
+    measure : callable
+        Measurement of one frame.
 
     Yields
     ------
@@ -75,7 +79,7 @@ def one_polarity(
         kept: list[tuple[Frame | LostFrame, Outcome]] = []
         pixels = 0
         for item in source:
-            outcome = measure_frame(item, settings) if isinstance(item, Frame) else item
+            outcome = measure(item, settings) if isinstance(item, Frame) else item
             if isinstance(outcome, GapMeasurement):
                 votes["dark" if outcome.light_gap else "light"] += 1
             elif not votes:
@@ -91,12 +95,12 @@ def one_polarity(
             settings = replace(settings, fingers_are_dark=votes["dark"] >= votes["light"])
         for item, outcome in kept:
             is_other = isinstance(outcome, GapMeasurement) and outcome.light_gap != settings.fingers_are_dark
-            yield item, measure_frame(item, settings) if is_other and isinstance(item, Frame) else outcome
+            yield item, measure(item, settings) if is_other and isinstance(item, Frame) else outcome
     while not is_stopped():
         following = next(source, None)
         if following is None:
             return
-        yield following, measure_frame(following, settings) if isinstance(following, Frame) else following
+        yield following, measure(following, settings) if isinstance(following, Frame) else following
 
 
 # Handle Ctrl-C and SIGTERM between two frames, so that no row of the table is incomplete.
@@ -187,18 +191,19 @@ def prepared(description: Description, task: Task) -> Prepared:
 
 
 def measure_frames(
-    source: FrameSource,
+    source: Iterable[Frame | LostFrame],
     how: Prepared,
     series: GapSeries,
     take_rows: TakeRows,
     see_item: SeeItem | None = None,
     on_progress: Progress | None = None,
+    measure: MeasureFrame = measure_frame,
 ) -> bool:
     """Measure a recording from its first frame to its last.
 
     Parameters
     ----------
-    source : FrameSource
+    source : iterable of Frame or LostFrame
         Recording, read once, by a separate thread.
     how : Prepared
         Result of `prepared`.
@@ -210,6 +215,8 @@ def measure_frames(
         Called with every frame, also a lost one, and its result.
     on_progress : callable or None
         Called at intervals with the number of frames done and the number that the source announces.
+    measure : callable
+        Measurement of one frame, after the camera has been learnt.
 
     Returns
     -------
@@ -239,7 +246,7 @@ def measure_frames(
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(items, how, series, asked.is_set):
+            for item, outcome in _outcomes(items, how, series, asked.is_set, measure):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if see_item is not None:
@@ -262,13 +269,14 @@ def _outcomes(
     how: Prepared,
     series: GapSeries,
     is_stopped: Callable[[], bool],
+    measure: MeasureFrame,
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Yield every frame with its result; the decoder runs ahead, and stops when this generator is closed."""
     pictures = SoundPictures()
 
     def judged(frames: Iterable[Frame | LostFrame]) -> Iterator[Judged]:
         settings = replace(how.settings, camera=series.camera)
-        for item, outcome in one_polarity(frames, settings, series.votes, is_stopped):
+        for item, outcome in one_polarity(frames, settings, series.votes, is_stopped, measure):
             if isinstance(item, LostFrame) or isinstance(outcome, LostFrame):
                 yield item, outcome
             else:

@@ -17,10 +17,8 @@ from fingervision.live.capture import Arrival, Capture, Ended
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.live.supervisor import Supervisor
 from fingervision.measuring.measure import measure
-from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.vision.pipeline import measure_frame
 
 COUNT, RATE_HZ, SIZE_PX, SCALE = 60, 25, (160, 120), 17.0
 CODERS = {
@@ -61,15 +59,11 @@ def recorded(stream: Path, out: Path, task: Task) -> Path:
     capture = Capture(NetworkStream(str(stream)), again=None)
     source = capture.source
     run = RunFolder(out, source.description, task, source.template)
-    rows = RowMaker(task.scale, SIZE_PX)
     capture.start(Supervisor(lambda *_: None))
     capture.begin()
     while not isinstance(what := capture.next(5.0), Ended):
         if isinstance(what, Arrival):
-            item = what.item
-            outcome = measure_frame(item, task.settings) if isinstance(item, Frame) else item
-            (row,) = rows.rows((Result(item.index, item.time_s, outcome),))
-            run.add(RecordedFrame(item, what.packets, row))
+            run.add(RecordedFrame(what.item, what.packets))
     run.close("The stream ended.")
     return run.path
 

@@ -14,6 +14,8 @@ from fingervision.storage.row_file import FLUSH_EVERY_S
 
 SCALE = ("--px-per-mm", "34")
 LOST_AT_MOST_S = 1.0
+# A disk for more frames than wait until the camera is learnt, so that there are rows before it is full.
+DISK_MB = 24
 Start = Callable[..., Any]
 
 
@@ -67,7 +69,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_measuring(
     disk = tmp_path / "disk"
     disk.mkdir()
     mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(disk)], capture_output=True, text=True, check=False
+        ["mount", "-t", "tmpfs", "-o", f"size={DISK_MB}m", "tmpfs", str(disk)], capture_output=True, text=True, check=False
     )
     if mounted.returncode:
         pytest.skip(f"a small disk cannot be mounted here: {mounted.stderr.strip()}")

@@ -56,7 +56,7 @@ export function make() {
   if (view.zoomed && shown) view.chart.setScale("x", { min: shown.min, max: shown.max });
   view.dirty = true;
 }
-export function redraw() { for (const chart of [view.chart, view.residual]) if (chart) chart.redraw(false); }
+export function redraw() { for (const chart of [view.chart, view.residual]) if (chart) chart.redraw(false, true); } // with its axes: without, a layout that is due would be forgotten
 export function zoomTo(from, to) {
   view.zoomed = true;
   view.dirty = true;
