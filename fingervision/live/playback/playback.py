@@ -9,7 +9,7 @@ from threading import Condition, Thread
 from time import monotonic
 from typing import Any
 
-from fingervision.domain.errors import LimitError
+from fingervision.domain.errors import DataError, LimitError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.seeking import Seeking, seeking
@@ -117,6 +117,7 @@ USUAL_RATE_HZ = 25.0
 # Time between two checks whether the displayed frame must change.
 LOOK_EVERY_S = 0.02
 SPEEDS = (0.01, 100.0)
+NO_PICTURE = (Status.DAMAGED, Status.DUPLICATE)
 PLAYING, MEASURING = "Playing the recording", "Measuring the recording"
 
 
@@ -390,6 +391,10 @@ class Playback:
     def _show(self, frame: int, row: GapRow | None) -> None:
         try:
             item = self._reader.at(frame, self._own_time(frame, row))
+            if row is not None and row.status not in NO_PICTURE and not isinstance(item, Frame):
+                raise DataError(
+                    f"Frame {frame} of {self.recorded.name} must be there, because it was measured, but is not."
+                )
             if item is None:
                 item = LostFrame(frame, None, Status.DAMAGED, "The recording has no frame of this number.")
             self.seen = recorded_frame(item, row, self.choices, self.description)
@@ -403,7 +408,7 @@ class Playback:
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
         """Time of a frame (s); None if the frame has no picture, or if a neighbouring frame has the same time."""
-        if row is None or row.time_s is None or row.status in (Status.DAMAGED, Status.DUPLICATE):
+        if row is None or row.time_s is None or row.status in NO_PICTURE:
             return None
         neighbours = [self._row(frame - 1) if frame else None, self._row(frame + 1)]
         return None if any(each is not None and each.time_s == row.time_s for each in neighbours) else row.time_s

@@ -1,0 +1,41 @@
+"""The table of a run is that of its video: one camera, learnt from the run's own first frames."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from calib.calibration import BareScale
+from fingervision.domain.frame import Coding, Frame
+from fingervision.frames.source import Description, open_source
+from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.measuring.measure import measure
+from fingervision.measuring.task import Task
+from fingervision.rendering import Camera, render, two_fingers
+from fingervision.vision.pipeline import measure_frame
+
+COUNT, SIZE_PX, SCALE = 40, (160, 120), 17.0
+
+
+def coded_as_srgb(levels: np.ndarray) -> np.ndarray:
+    light = levels / 255.0
+    coded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1.0 / 2.4) - 0.055)
+    return np.round(255.0 * coded).astype(np.uint8)
+
+
+def test_a_run_whose_camera_becomes_known_on_the_way_has_the_table_of_its_video(tmp_path: Path) -> None:
+    task = Task(BareScale(SCALE))
+    description = Description("camera", "camera", "raw", Coding.LOSSLESS, *SIZE_PX, 25.0, True, None)  # noqa: FBT003
+    run = RunFolder(tmp_path / "runs", description, task, None)
+    for k in range(COUNT):
+        scene = two_fingers(50.0 + 0.5 * k, below_tip_px=5.1, width_px=25.0, frame=SIZE_PX)
+        levels = coded_as_srgb(render(scene, Camera(noise_grey=1.0), np.random.default_rng(k)))
+        frame = Frame(levels, k + 7, 3.0 + k / 25.0, Coding.LOSSLESS)
+        # As the view does: with what is known of the camera when a frame comes.
+        settings = task.settings if run.camera is None else replace(task.settings, camera=run.camera)
+        run.add(RecordedFrame(frame, (), (settings, measure_frame(frame, settings))))
+    run.close("The test ended.")
+    measure(open_source(str(run.path / "video.mp4")), task, tmp_path / "again")
+    live, again = ((path / "gaps.csv").read_text() for path in (run.path, tmp_path / "again"))
+    assert live.count(",ok,") == COUNT
+    assert again == live
