@@ -136,9 +136,13 @@ class Recorder:
                 self._waiting.put(None, timeout=PATIENCE_S)
             except Full:
                 self.fail(self._too_slow())
-        self._thread.join(PATIENCE_S)
+        self.join()
         if self.failure:
             raise OutputError(self.failure)
+
+    def join(self) -> None:
+        """Wait until everything is written that was recorded before the end."""
+        self._thread.join(PATIENCE_S)
 
     def _too_slow(self) -> str:
         """State whether the disk or the processor was the bottleneck since frames have had to wait."""

@@ -24,8 +24,9 @@ from fingervision.measuring.task import Task
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
 from fingervision.vision.pipeline import Settings, measure_frame
 
-# Largest number of frames that wait for the measurement, four seconds at 25 frames per second: the camera is learnt in a
-# half on a quiet machine, and meanwhile the video is written. Interval (s) of the checks whether the thread still runs.
+# Largest number of frames that wait for the measurement, four seconds at 25 frames per second: the camera is learnt in
+# half a second on a quiet machine, and the video is written meanwhile. Interval (s) of the checks whether the thread
+# still runs.
 FRAMES_WAITING, PATIENCE_S = 100, 0.2
 
 Measured = tuple[Settings, GapMeasurement | NoGap]

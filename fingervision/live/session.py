@@ -166,6 +166,7 @@ class Session:
         self._frame_at_s = monotonic()
         self._interrupted, self._run = False, ""
         self._recorder: Recorder | None = None
+        self._failed: Recorder | None = None
         self._beginning = False
         self.supervisor = Supervisor(self.say)
         self._overflow = OverflowReport(capture, self.say)
@@ -190,6 +191,8 @@ class Session:
         self._stopped.set()
         if self._thread is not None:
             self._thread.join()
+        if self._failed is not None:
+            self._failed.join()
         if self._recorder is not None:
             self.stop_recording()
 
@@ -397,7 +400,7 @@ class Session:
                 seen = None if outcome is None or settings is None else (settings, outcome)
                 recorder.add(RecordedFrame(item, arrival.packets, seen))
                 if recorder.failure:
-                    self._recorder = None
+                    self._recorder, self._failed = None, recorder
         self._overflow.say()
         for listener in self.on_row:
             listener(row, arrival.arrived_s)

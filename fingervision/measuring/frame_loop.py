@@ -50,7 +50,7 @@ def one_polarity(
     settings: Settings,
     votes: Counter[str],
     is_stopped: Callable[[], bool] = lambda: False,
-    measure: MeasureFrame = measure_frame,
+    measure: MeasureFrame | None = None,
 ) -> Iterator[tuple[Frame | LostFrame, Outcome]]:
     """Measure frames in order, all with the polarity found in most of the first frames that have a measured gap.
 
@@ -65,8 +65,8 @@ def one_polarity(
     is_stopped : callable
         Called after every frame; if it returns True no more frames are read, and the frames measured so far are still
         yielded.
-    measure : callable
-        Measurement of one frame.
+    measure : callable or None
+        Measurement of one frame, if not `measure_frame`.
 
     Yields
     ------
@@ -74,7 +74,7 @@ def one_polarity(
         Every frame with its result. The first frames with a gap are yielded after all of them have been counted; frames
         without a gap before them are yielded at once.
     """
-    source = iter(frames)
+    source, measure = iter(frames), measure or measure_frame
     if settings.fingers_are_dark is None:
         kept: list[tuple[Frame | LostFrame, Outcome]] = []
         pixels = 0
@@ -197,7 +197,7 @@ def measure_frames(
     take_rows: TakeRows,
     see_item: SeeItem | None = None,
     on_progress: Progress | None = None,
-    measure: MeasureFrame = measure_frame,
+    measure: MeasureFrame | None = None,
 ) -> bool:
     """Measure a recording from its first frame to its last.
 
@@ -215,8 +215,8 @@ def measure_frames(
         Called with every frame, also a lost one, and its result.
     on_progress : callable or None
         Called at intervals with the number of frames done and the number that the source announces.
-    measure : callable
-        Measurement of one frame, after the camera has been learnt.
+    measure : callable or None
+        Measurement of one frame after the camera has been learnt, if not `measure_frame`.
 
     Returns
     -------
@@ -269,7 +269,7 @@ def _outcomes(
     how: Prepared,
     series: GapSeries,
     is_stopped: Callable[[], bool],
-    measure: MeasureFrame,
+    measure: MeasureFrame | None,
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Yield every frame with its result; the decoder runs ahead, and stops when this generator is closed."""
     pictures = SoundPictures()

@@ -25,7 +25,7 @@ def coded_as_srgb(levels: np.ndarray) -> np.ndarray:
 
 def test_a_run_whose_camera_becomes_known_on_the_way_has_the_table_of_its_video(tmp_path: Path) -> None:
     task = Task(BareScale(SCALE))
-    description = Description("camera", "camera", "raw", Coding.LOSSLESS, *SIZE_PX, 25.0, True, None)  # noqa: FBT003
+    description = Description("camera", "camera", "raw", Coding.LOSSLESS, *SIZE_PX, 25.0, True, None)
     run = RunFolder(tmp_path / "runs", description, task, None)
     for k in range(COUNT):
         scene = two_fingers(50.0 + 0.5 * k, below_tip_px=5.1, width_px=25.0, frame=SIZE_PX)

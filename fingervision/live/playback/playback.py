@@ -391,10 +391,7 @@ class Playback:
     def _show(self, frame: int, row: GapRow | None) -> None:
         try:
             item = self._reader.at(frame, self._own_time(frame, row))
-            if row is not None and row.status not in NO_PICTURE and not isinstance(item, Frame):
-                raise DataError(
-                    f"Frame {frame} of {self.recorded.name} must be there, because it was measured, but is not."
-                )
+            self._refuse_missing(item, frame, row)
             if item is None:
                 item = LostFrame(frame, None, Status.DAMAGED, "The recording has no frame of this number.")
             self.seen = recorded_frame(item, row, self.choices, self.description)
@@ -404,6 +401,12 @@ class Playback:
             self.supervisor.alarm(
                 PLAYING,
                 f"The recording cannot be read any more: {told(error)} Put the file back, and select the frame again.",
+            )
+
+    def _refuse_missing(self, item: Item | None, frame: int, row: GapRow | None) -> None:
+        if row is not None and row.status not in NO_PICTURE and not isinstance(item, Frame):
+            raise DataError(
+                f"Frame {frame} of {self.recorded.name} must be there, because it was measured, but is not."
             )
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
