@@ -48,8 +48,9 @@ LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
 # Share of a curve's displacement of an edge that is added to the uncertainty for curves of no family: their error in
 # recordings of log, film and S-curves (tests/benchmarks/unknown_cameras.py).
 FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15}
-# Probability below which nothing is beside the edges is the less probable case, and of a rival that still counts.
-EVEN, LEAST_RIVAL = 0.5, 1e-3
+# Probability of nothing beside the edges below which a tone curve does not explain them alone (20:1), and of a rival
+# that still counts.
+UNLIKELY, LEAST_RIVAL = 0.05, 1e-3
 REMEDY = "calibrate with bars of three widths, give the curve with --response, or switch the picture profile off"
 NO_FLANKS = (
     "The camera's response could not be learnt, because no straight flank of a finger shows both its plateaus "
@@ -115,7 +116,7 @@ def learnt_from_profiles(
     assumed = prior.response.curve
     fits, misfit = _fitted(profiles, coding, assumed.name if assumed.name in CURVES else "")
     scenes, bare = _with_scenes(fits, wide, coding)
-    if bare < EVEN:
+    if bare < UNLIKELY:
         fits, misfit = scenes, _misfit(scenes)
         scenes = []
     if misfit > MOST_MISFIT:
