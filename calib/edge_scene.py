@@ -43,6 +43,9 @@ class Scene:
         Parameters from which a fit begins, and the positions of inner and of outer edges that go with them (pixels).
     probability : float
         Prior probability.
+    u_form : float
+        Relative standard uncertainty of a displacement, because real walls, shadows and lines are not even along a
+        finger, and lines of other shapes fit as well.
     """
 
     name: str
@@ -51,6 +54,7 @@ class Scene:
     u: tuple[float, ...]
     starts: tuple[tuple[tuple[float, ...], float, float], ...]
     probability: float
+    u_form: float = 0.0
 
 
 def _nothing(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
@@ -141,13 +145,13 @@ NOTHING = Scene("", _nothing, (), (), (((), 0.0, 0.0),), 0.72)
 # Prior probabilities: one recording in ten shows a wall (thick parts), a shadow, or a bright line (edges that are
 # chamfered or polished); a chamfer that is evenly bright up to the edge on all sides is rare.
 SCENES = (
-    Scene("wall", _wall(lambda side, is_outer: np.where(is_outer, 0.0, 1.0)), *_INNER_WALL, 0.06),
-    Scene("wall", _wall(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02),
-    Scene("wall", _wall(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02),
-    Scene("glare", _line, *_LINE, 0.06),
-    Scene("glare", _band, *_BAND, 0.02),
-    Scene("shadow", _shadow(_QUANTILES), *_SHADOW, 0.05),
-    Scene("shadow", _shadow(-np.log1p(-_QUANTILES)), *_SHADOW, 0.05),
+    Scene("wall", _wall(lambda side, is_outer: np.where(is_outer, 0.0, 1.0)), *_INNER_WALL, 0.06, 0.1),
+    Scene("wall", _wall(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02, 0.1),
+    Scene("wall", _wall(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02, 0.1),
+    Scene("glare", _line, *_LINE, 0.06, 0.35),
+    Scene("glare", _band, *_BAND, 0.02, 0.35),
+    Scene("shadow", _shadow(_QUANTILES), *_SHADOW, 0.05, 0.1),
+    Scene("shadow", _shadow(-np.log1p(-_QUANTILES)), *_SHADOW, 0.05, 0.1),
 )
 
 # Distances of the steps that the score test tries, at the inner edges and at all of them.

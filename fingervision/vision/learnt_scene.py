@@ -20,9 +20,6 @@ Floats = NDArray[np.float64]
 DISCREPANCY = {Coding.LOSSLESS: 0.004, Coding.INTRAFRAME: 0.006, Coding.INTERFRAME: 0.012}
 # Extent of the profiles beyond the blur (pixels): the light comes back within this distance beside most shadows.
 BESIDE_PX = 12.0
-# Share of a displacement on the straight flanks by which that at the measuring point may differ: it may lie on a
-# fillet, and real walls, lines and shadows are not even along a finger.
-U_ELSEWHERE = 0.05
 # Probability of nothing beside the edges above which nothing is learnt.
 SURE = 0.99
 # Mean chi-square of a bin above which nothing that is known explains the edges.
@@ -89,7 +86,7 @@ def beside_edges(fits: Sequence[FamilyFit], profiles: Sequence[EdgeProfile]) -> 
         ends = [place[0, False], place[1, False]]
         sums = values[:, ends].sum(axis=1)
         own = np.array([misfit * fit.at_covariance[np.ix_(ends, ends)].sum() for fit in fits])
-        own += (U_ELSEWHERE * np.abs(values[:, ends]).sum(axis=1)) ** 2
+        own += np.array([(fit.scene.u_form * np.abs(fit.at_px[ends]).sum()) ** 2 for fit in fits])
         return float(np.sqrt(weight @ (own + (sums - weight @ sums) ** 2)))
 
     inner, outer = mean(at, False), mean(at, True)

@@ -222,6 +222,7 @@ CLASSES: dict[str, Callable[[Recording], Film]] = {
 SURFACES = {
     "": Surface(),
     "shadow": Surface(shadow=0.2),
+    "narrow-wall": Surface(wall_px=1.0),
     "wall": Surface(wall_px=2.0),
     "glare": Surface(glare=0.4),
 }
