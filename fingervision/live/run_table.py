@@ -24,10 +24,10 @@ from fingervision.measuring.task import Task
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
 from fingervision.vision.pipeline import Settings, measure_frame
 
-# Largest number of frames that wait for the measurement, four seconds at 25 frames per second: the camera is learnt in
-# half a second on a quiet machine, and the video is written meanwhile. Interval (s) of the checks whether the thread
-# still runs.
-FRAMES_WAITING, PATIENCE_S = 100, 0.2
+# Memory (bytes) and least number of frames that wait for the measurement: the camera is learnt in half a second on a
+# quiet machine, and in five where a wall, a line or a shadow stands beside the edges; the video is written meanwhile.
+# Interval (s) of the checks whether the thread still runs.
+MEMORY_WAITING, FRAMES_WAITING, PATIENCE_S = 500_000_000, 100, 0.2
 
 Measured = tuple[Settings, GapMeasurement | NoGap]
 
@@ -55,7 +55,9 @@ class RunTable:
         self.camera: CameraModel | None = None
         """Camera of the recording; None until it is learnt."""
         self._rows = GapsCsv(path)
-        self._waiting: Queue[Frame | LostFrame | None] = Queue(FRAMES_WAITING)
+        self._waiting: Queue[Frame | LostFrame | None] = Queue(
+            max(FRAMES_WAITING, MEMORY_WAITING // (description.width_px * description.height_px))
+        )
         self._seen: dict[int, tuple[Coding, Measured]] = {}
         self._failure: Exception | None = None
         self._thread = Thread(target=self._measure, name="Table", daemon=True)
