@@ -243,7 +243,7 @@ def fit_scenes(
     families : sequence of Family
         Families of tone curves that are fitted with every scene.
     others : sequence of Family
-        Families that are fitted with nothing beside the edges, and with the two most probable scenes.
+        Families that are fitted with nothing beside the edges, and with scenes that the first family does not exclude.
     """
     data = _Data.of(profiles, 0.0, 1.0, (), np.inf).with_discrepancy(discrepancy)
     coarse = _Data.of([_thinned(profile) for profile in profiles], 0.0, 1.0, (), np.inf).with_discrepancy(discrepancy)
@@ -283,7 +283,7 @@ def fixed_family(response: CameraResponse) -> Family:
 
 
 def family(name: str) -> Family:
-    """Family of this name."""
+    """Return the family of tone curves with a name in `FAMILIES`."""
     return next(each for each in FAMILIES if each.name == name)
 
 

@@ -17,6 +17,9 @@ Floats = NDArray[np.float64]
 REACH_SIGMAS, REACH_EXTRA_PX, FARTHEST_PX = 4.0, 4.0, 20
 # Largest scatter of the rows about a straight line (pixels), and fewest fitted rows, in the part far from the tip.
 STRAIGHT_PX, FEWEST_ROWS = 0.4, 6
+# Least contrast of a flank (share of full scale) within which a curve can be seen, and levels beyond which it is
+# clipped.
+LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
 
 Seen = tuple[GreyImage, EdgePoints]
 
@@ -39,6 +42,16 @@ def flank_profiles(seen: Sequence[Seen], top_level: int, extra_px: float = REACH
         for is_inner in (True, False)
     )
     return [profile for profile in found if profile is not None]
+
+
+def unclipped_profiles(seen: Sequence[Seen], top_level: int, extra_px: float = REACH_EXTRA_PX) -> list[EdgeProfile]:
+    """Profiles with enough contrast whose plateaus lie within the scale; see `flank_profiles`."""
+    return [each for each in flank_profiles(seen, top_level, extra_px) if _is_unclipped(each)]
+
+
+def _is_unclipped(profile: EdgeProfile) -> bool:
+    dark, light = profile.ends
+    return profile.contrast > LEAST_CONTRAST and dark > CLIPPED[0] and light < CLIPPED[1]
 
 
 def flank_profile(

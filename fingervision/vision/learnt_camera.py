@@ -27,7 +27,7 @@ from fingervision.domain.camera import (
     ResponseEstimate,
 )
 from fingervision.domain.frame import Coding
-from fingervision.vision.flank_profiles import Seen, flank_profiles
+from fingervision.vision.flank_profiles import Seen, unclipped_profiles
 from fingervision.vision.learnt_scene import BESIDE_PX, DISCREPANCY, SURE, beside_edges, can_tell_beside
 
 # Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
@@ -42,9 +42,6 @@ MOST_MISFIT = 1.3
 MOST_OVERSHOOT = 0.03
 # Negative share of the point spread's tails from which the camera sharpens: no optics takes light away.
 NEGATIVE_TAILS = 0.08
-# Least contrast of a flank (share of full scale) within which a curve can be seen, and levels beyond which it is
-# clipped.
-LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
 # Share of a curve's displacement of an edge that is added to the uncertainty for curves of no family: their error in
 # recordings of log, film and S-curves (tests/benchmarks/unknown_cameras.py).
 FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15}
@@ -96,11 +93,8 @@ def learnt_camera(
     CameraModel
         The prior with a learnt response; or with the assumed one and a sentence on why it could not be learnt.
     """
-    profiles = [profile for profile in flank_profiles(seen, top_level) if _is_usable(profile)]
-    wide = (
-        [profile for profile in flank_profiles(seen, top_level, BESIDE_PX) if _is_usable(profile)] if are_dark else []
-    )
-    return learnt_from_profiles(profiles, prior, coding, wide)
+    wide = unclipped_profiles(seen, top_level, BESIDE_PX) if are_dark else []
+    return learnt_from_profiles(unclipped_profiles(seen, top_level), prior, coding, wide)
 
 
 def learnt_from_profiles(
@@ -155,11 +149,6 @@ def _with_response(
     if response.curve.white != assumed.white:  # a video of studio range stays clipped at its white
         response = replace(response, curve=replace(response.curve, white=assumed.white))
     return replace(camera, response=response)
-
-
-def _is_usable(profile: EdgeProfile) -> bool:
-    dark, light = profile.ends
-    return profile.contrast > LEAST_CONTRAST and dark > CLIPPED[0] and light < CLIPPED[1]
 
 
 def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[list[FamilyFit], float]:

@@ -11,7 +11,7 @@ from calib.edge_response import FamilyFit, fit_scenes, fixed_family, is_more_bes
 from calib.edge_scene import NOTHING
 from fingervision.domain.camera import BesideEdges
 from fingervision.domain.frame import Coding
-from fingervision.vision.flank_profiles import Seen, flank_profiles
+from fingervision.vision.flank_profiles import Seen, unclipped_profiles
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def learnt_beside(
     noise : float
         Standard deviation of an edge about the best model, independent from place to place (share of the contrast).
     """
-    profiles = flank_profiles(seen, top_level, BESIDE_PX)
+    profiles = unclipped_profiles(seen, top_level, BESIDE_PX)
     family = fixed_family(response)
     if not can_tell_beside(profiles) or not is_more_beside(profiles, noise, family):
         return None
