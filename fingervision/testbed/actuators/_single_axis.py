@@ -38,6 +38,9 @@ LOOK_EVERY_S = 0.01
 STILL_S, STILL_SHARE, STILL_MM = 0.15, 0.1, 0.001
 # No stage of the right units is twice as fast as it was told; the wrong ones differ by 10, 25.4, 60 or 1000.
 TOO_FAST = 2.0
+# A controller states a position that is refreshed at intervals, and may be ahead of the stage or behind it by one of
+# them: at most 0.2 s, twice the interval of the usual scan of an EPICS server.
+REFRESHED_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +106,8 @@ class SingleAxis(FreeMoves, ABC):
         self._closed = self._seen = False
         # The last position, that which the stage held before, since when, and by how much and how long it must be held.
         self._now_mm, self._held_mm, self._since_s, self._still_mm, self._still_s = inf, inf, -inf, STILL_MM, STILL_S
+        # The longest way between two successive positions of the motion.
+        self._jump_mm = 0.0
 
     # Seven calls of a driver; positions are those of the device (mm).
 
@@ -206,10 +211,11 @@ class SingleAxis(FreeMoves, ABC):
         """Compare position and duration of a motion with its target and speed; return that the stage does not move."""
         at_mm = self._at_mm()
         way_mm, took_s = abs(at_mm - motion.from_mm), self._since_s - motion.began_s
+        sure_mm = way_mm - min(self._jump_mm, REFRESHED_S * motion.speed_mm_s)
         if abs(at_mm - to_mm) > self._near_mm + LOST_MM:
             words = f"it was sent to {to_mm:g} mm and rests at {at_mm:g} mm: steps were lost, or it was stopped by hand"
             self._fault = Alarm("lost", f"{words}; home the stage")
-        elif way_mm > 4.0 * self._still_mm and TOO_FAST * took_s * motion.speed_mm_s < way_mm:
+        elif sure_mm > 4.0 * self._still_mm and TOO_FAST * took_s * motion.speed_mm_s < sure_mm:
             words = f"it was told {motion.speed_mm_s:g} mm/s, but went {way_mm:.3g} mm within {took_s:.2g} s"
             why = "it does not keep its speed, states its target as its position, or has other units than stated"
             self._fault = Alarm("fast", f"{words}: {why}")
@@ -306,7 +312,7 @@ class SingleAxis(FreeMoves, ABC):
 
     def _went(self, stops: int, motion: _Motion) -> None:
         """Note a motion that was begun; a stop that came while it was begun is repeated, because it came too early."""
-        self._motion, self._seen, self._since_s = motion, False, self._clock.now_s()
+        self._motion, self._seen, self._since_s, self._jump_mm = motion, False, self._clock.now_s(), 0.0
         if self._stops != stops:
             self.stop()
 
@@ -314,7 +320,8 @@ class SingleAxis(FreeMoves, ABC):
         position_mm = self._asked(self._position_mm)
         if not isfinite(position_mm):
             raise DeviceError(f"{self.name} must answer with its position, but answered {position_mm}.")
-        self._now_mm = at_mm = (position_mm - self._settings.zero_mm) * self._settings.sign
+        at_mm = (position_mm - self._settings.zero_mm) * self._settings.sign
+        self._jump_mm, self._now_mm = max(self._jump_mm, abs(at_mm - self._now_mm)), at_mm
         if abs(at_mm - self._held_mm) > self._still_mm:
             self._held_mm, self._since_s = at_mm, self._clock.now_s()
         return at_mm

@@ -438,6 +438,14 @@ class Invented(Emulator):
     """The invented controller of the manual's page on stages: micrometres, every command is answered."""
 
     answer_end = b"\n"
+    # The position is refreshed at this interval, if it is not zero, and is that of as much later or earlier.
+    refreshed_s = ahead_s = 0.0
+
+    def stated_mm(self) -> float:
+        if not self.refreshed_s:
+            return self.plant.at()
+        scanned_s = Time.now_s() // self.refreshed_s * self.refreshed_s
+        return self.plant.was_at(scanned_s + self.ahead_s)
 
     def answer(self, line: str) -> list[str]:
         plant, words = self.plant, line.strip().split()
@@ -445,7 +453,7 @@ class Invented(Emulator):
             case ["1ID?"]:
                 return ["INVENTED STAGE 1.0"]
             case ["1POS?"]:
-                return [f"{plant.at() * 1000.0:.3f}"]
+                return [f"{self.stated_mm() * 1000.0:.3f}"]
             case ["1STATE?"]:
                 return ["MOVE" if plant.moves else "IDLE"]
             case ["1SPEED", speed]:

@@ -57,6 +57,32 @@ def test_a_stage_faster_than_its_speed_has_other_units(
     bed.close()
 
 
+@pytest.mark.parametrize("ahead_s", [0.0, 0.1])
+def test_a_position_that_is_refreshed_ten_times_in_a_second_is_no_other_speed(
+    ahead_s: float, device: Invented, tmp_path: Path
+) -> None:
+    """As with the motor record that caproto simulates: a step of a tenth of a second is stated in one jump."""
+    bed = opened(EXAMPLE, device, tmp_path)
+    manual_control.home(bed)
+    device.refreshed_s, device.ahead_s = 0.1, ahead_s
+    for k in range(9):
+        manual_control.move(bed, 0.05 * (k + 1), 0.5)
+        assert bed.actuator.alarm is None
+        # The begins of the motions fall on all phases of the interval.
+        bed.clock.wait_until(bed.clock.now_s() + 0.311)
+        assert bed.actuator.readings()[-1].value == pytest.approx(0.05 * (k + 1), abs=0.001)
+    bed.close()
+
+
+def test_a_stage_that_states_its_target_as_its_position_is_noticed(device: Invented, tmp_path: Path) -> None:
+    bed = opened(EXAMPLE, device, tmp_path)
+    manual_control.home(bed)
+    device.refreshed_s, device.ahead_s = 0.001, 1e3
+    with pytest.raises(DeviceError, match=r"told 0\.5 mm/s, but went 1 mm .*states its target"):
+        manual_control.move(bed, 1.0, 0.5)
+    bed.close()
+
+
 @pytest.mark.parametrize("ratio", [25.4, 10.0, 0.1, 1.0])
 def test_units_that_command_and_report_alike_are_told_by_the_picture(
     ratio: float, device: Invented, tmp_path: Path
