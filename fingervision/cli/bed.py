@@ -266,11 +266,11 @@ def _contract_line(part: str, bed_name: str) -> str:
 @click.argument("kind", required=False)
 def recipe(kind: str | None) -> None:
     """List the kinds of a recipe's steps with their keys, or only those of KIND."""
-    from fingervision.domain.errors import UsageError
+    from fingervision.domain.errors import UnknownNameError
     from fingervision.testbed.recipe_kinds import described, step_kinds
 
     if kind is not None and kind not in step_kinds():
-        raise UsageError(f"A step must be of a kind that exists ({', '.join(step_kinds())}), but is {kind}.")
+        raise UnknownNameError("KIND", kind, step_kinds(), "a kind of step", f"there are {', '.join(step_kinds())}")
     click.echo("\n\n".join(described(each) for each in ([kind] if kind else step_kinds())))
 
 

@@ -6,7 +6,7 @@ import click
 
 from fingervision.cli._command import make_command
 from fingervision.cli._options import complete_effect, effects_option, figure_option
-from fingervision.domain.errors import UsageError
+from fingervision.domain.errors import UnknownNameError, UsageError
 
 EXAMPLES = """
 \b
@@ -23,8 +23,6 @@ Examples:
 @figure_option("Plot the residual that the effect causes.")
 def command(name: str | None, figure: Path | None) -> None:
     """List the physical effects, or explain the effect NAME."""
-    from difflib import get_close_matches
-
     from fingervision.effects import catalogue, origin_of
 
     if name is None:
@@ -37,9 +35,7 @@ def command(name: str | None, figure: Path | None) -> None:
             )
         return
     if name not in catalogue():
-        near = get_close_matches(name, catalogue(), n=1)
-        hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
-        raise UsageError(f"An effect must be one of the catalogue, but is {name}: {hint}")
+        raise UnknownNameError("NAME", name, catalogue(), "an effect", "`fingervision effects` lists them")
     effect = catalogue()[name]
     needs = [
         words

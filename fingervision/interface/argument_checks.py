@@ -66,7 +66,8 @@ def in_command(error: ArgumentError) -> str:
     '--below-tip-mm must be positive, but is -3.'
     """
     sentence, argument = str(error), error.argument
-    if not sentence.startswith(argument):
+    # What is no option but a word of the command stands in its help in capital letters.
+    if not sentence.startswith(argument) or argument.isupper():
         return sentence
     return OF_ARGUMENTS.get(argument, f"--{argument.replace('_', '-')}") + sentence.removeprefix(argument)
 

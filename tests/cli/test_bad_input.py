@@ -247,6 +247,9 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     *((calibrated(f"{name}.json"), 1, f"{name}.json") for name in ("deep", "list", "null", "nan", "empty")),
     # Recipes.
     (bed("dance.toml"), 1, "danc"),
+    (("bed", "recipe", "sinus"), 2, "KIND must be a kind of step, but is 'sinus': did you mean sine?"),
+    (("bed", "recipe", "dance"), 2, "staircase"),
+    (("effects", "backlsh"), 2, "did you mean backlash?"),
     (bed("step3.toml"), 1, "[[step]]"),
     (bed("far.toml"), 1, "1e+09"),
     (bed("still.toml"), 1, "speed_mm_s"),

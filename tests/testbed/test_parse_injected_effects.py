@@ -36,7 +36,7 @@ def test_a_sealed_file_hides_what_it_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("word", "sentence"),
     [
-        ("backlsh", "An effect must be one of the catalogue, but is backlsh: did you mean backlash?"),
+        ("backlsh", "hide must be an effect, but is 'backlsh': did you mean backlash?"),
         ("backlash:play=0.1", "A parameter of backlash must be one of play_mm, but is play."),
         ("backlash:play_mm=9", "play_mm of backlash must be between 0 and 0.5, but is 9."),
         ("backlash:play_mm=a", "play_mm of backlash must be a number, but is a."),

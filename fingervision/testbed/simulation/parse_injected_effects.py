@@ -1,12 +1,11 @@
 """Read injected effects from command-line arguments or from a sealed file."""
 
-import difflib
 from pathlib import Path
 
 import numpy as np
 
 from fingervision.domain.effect import Effect, History
-from fingervision.domain.errors import DataError, UsageError
+from fingervision.domain.errors import DataError, UnknownNameError, UsageError
 from fingervision.effects import catalogue
 from fingervision.storage.toml_section import Section, read_document
 from fingervision.testbed.simulation.injected_effects import Hidden
@@ -72,7 +71,8 @@ def usual_values(effect: Effect) -> dict[str, float]:
 
 def _spoken(word: str) -> tuple[str, dict[str, float]]:
     name, _, rest = word.partition(":")
-    _known(name)
+    if name not in catalogue():
+        raise UnknownNameError("hide", name, catalogue(), "an effect", "`fingervision effects` lists them")
     values: dict[str, float] = {}
     for part in filter(None, rest.split(",")):
         key, equals, number = part.partition("=")
@@ -101,13 +101,6 @@ def _sealed(path: Path) -> list[tuple[str, dict[str, float]]]:
     if not read:
         raise DataError(f"{path} must have at least one [[effect]], but has none.")
     return read
-
-
-def _known(name: str) -> None:
-    if name not in catalogue():
-        near = difflib.get_close_matches(name, catalogue(), n=1)
-        hint = f"did you mean {near[0]}?" if near else "`fingervision effects` lists them."
-        raise UsageError(f"An effect must be one of the catalogue, but is {name or '(nothing)'}: {hint}")
 
 
 def _inside(name: str, values: dict[str, float]) -> None:
