@@ -19,16 +19,30 @@ TARGETS = np.arange(-20.0, 21.0, 5.0)
 GAP_AT_ZERO_MM = 25.0
 
 
-def staged(folder: Path, *, play_mm: float, listed: bool, sign: float = 1.0, step_s: float = 28.0) -> Diagnosis:
+def staged(
+    folder: Path,
+    *,
+    play_mm: float,
+    listed: bool,
+    sign: float = 1.0,
+    step_s: float = 28.0,
+    bent_mm: float = 0.0,
+    warming_mm: float = 0.0,
+) -> Diagnosis:
     """Five ISO 230-2 cycles of a stage with engaged play; overshoots are rows without a gap, or are missing."""
     rng = np.random.default_rng(4)
     lines, clock = ["time_s,input_mm,gap_mm"], 0.0
     for _ in range(5):
         for targets, way in ((TARGETS, 1.0), (TARGETS[::-1], -1.0)):
-            rows = [(targets[0] - 0.5 * way, None), *((u, u - 0.5 * sign * way * play_mm) for u in targets)]
+            bent = bent_mm * np.sin(np.pi * targets / 13.0 + 0.7)
+            rows = [
+                (targets[0] - 0.5 * way, None),
+                *zip(targets, targets + bent - 0.5 * sign * way * play_mm, strict=True),
+            ]
             for u, at in rows:
                 clock += step_s
-                gap = "" if at is None else f"{GAP_AT_ZERO_MM + at + NOISE_MM * rng.standard_normal():.6f}"
+                warm = warming_mm * (1.0 - np.exp(-clock / 900.0))
+                gap = "" if at is None else f"{GAP_AT_ZERO_MM + at + warm + NOISE_MM * rng.standard_normal():.6f}"
                 if listed or at is not None:
                     lines.append(f"{clock:.2f},{u:.4f},{gap}")
     (folder / "measured.csv").write_text("\n".join(lines) + "\n")
@@ -45,6 +59,18 @@ def test_play_is_named_with_its_size_whether_overshoots_are_listed_or_not(tmp_pa
     assert play.value == pytest.approx(PLAY_MM, abs=4 * NOISE_MM / np.sqrt(90))
     assert report.pure_error_mm == pytest.approx(NOISE_MM, rel=0.25)
     assert report.explained_share > 0.95
+
+
+@pytest.mark.parametrize("larger", ["bent_mm", "warming_mm"])
+def test_play_between_overshoots_that_are_not_listed_is_named_beside_a_larger_error(
+    tmp_path: Path, larger: str
+) -> None:
+    report = staged(tmp_path, play_mm=PLAY_MM, listed=False, **{larger: 4.0 * PLAY_MM}).report
+    assert report.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
+    play = next(e for e in report.effects if e.name == "backlash").parameters["play_mm"]
+    assert play.value == pytest.approx(PLAY_MM, abs=4 * NOISE_MM / np.sqrt(90))
+    beside = "position_error_map" if larger == "bent_mm" else "thermal_drift"
+    assert all(beside in names for names in report.alternatives)
 
 
 def test_a_lag_is_excluded_where_readings_are_taken_at_rest(tmp_path: Path) -> None:

@@ -126,7 +126,7 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
         Reduction of -2 log of the marginal likelihood, minus the map's penalty.
     """
     history = problem.chain.history
-    nodes_mm = _nodes(history)
+    nodes_mm = set_points(history)
     raw = map_columns(problem.chain, nodes_mm)
     gram, aim = normal_equations(problem, explanation, raw)
     spacing = float(np.median(np.diff(nodes_mm)))
@@ -168,7 +168,8 @@ def _estimate(value: float, logarithms: Array, weight: Array) -> Estimate:
     return Estimate(value, value * spread, "mm")
 
 
-def _nodes(history: History) -> Array:
+def set_points(history: History) -> Array:
+    """Inputs at the nodes of a curve over the position: each one if there are few, else equidistant."""
     near = max(1e-6 * history.input_span_mm, 1e-300)
     _, first = np.unique(np.round(history.input_mm / near), return_index=True)
     places = history.input_mm[first]

@@ -5,23 +5,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-from fingervision.diagnosis.inference.explanation_candidates import Progress
+from fingervision.diagnosis.inference.explanation_candidates import Progress, single_effects
 from fingervision.diagnosis.inference.held_out_prediction import needed
-from fingervision.diagnosis.inference.hypothesis import Explanation, Point
+from fingervision.diagnosis.inference.hypothesis import Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.position_map import (
-    NAME,
-)
+from fingervision.diagnosis.inference.position_map import NAME, map_columns, set_points
 from fingervision.diagnosis.inference.posterior import beside_alternatives
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.random_effect_search import beside_gains, beside_map
 from fingervision.diagnosis.inference.record_errors import settled_with_records
-from fingervision.diagnosis.inference.search_state import Findings
+from fingervision.diagnosis.inference.search_state import ROUGH, Findings
 from fingervision.diagnosis.inference.searched import Look, Searched, problem_of, refitted
+from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.diagnosis.inference.turning_places import beside_turns
 from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
 BY_ACCIDENT = 1e-3
 """Probability of the observed or a larger mean of the runs' offsets by chance (Student's t), below which the offsets
@@ -86,26 +86,33 @@ def refitted_search(
 
 
 def _over_the_ends(state: Searched, look: Look) -> Searched:
-    """Search along a path that includes overshoots; keep the result if an effect with memory then fits better."""
-    data = state.data.with_overshoots()
+    """Search along a path that includes overshoots, if an effect with memory then fits better beside a free curve.
+
+    Both paths pass the same positions, so that no curve over the position depends on where the stage turned. Without
+    the curve, a map of position errors that is larger than the play decides instead.
+    """
+    data, found = state.data.with_overshoots(), state.found
     if data is state.data:
         return state
-    found = state.found
-    tried = [found.best, found.nearest, *_with_memory(found)]
-    straight = min(e.score for e in [found.nothing, *tried])
-    return look.again(data) if _refitted_score(found, data, tried) < straight - LEAST_GAIN else state
+    history, drawn = found.problem.chain.history, found.problem.whitener.drawing
+    curve_mm = map_columns(found.problem.chain, set_points(history)) * history.input_span_mm
+    beside = np.hstack([curve_mm, *([] if drawn is None else [drawn])])
+    problem = replace(found.problem, offsets=RunOffsets.of(replace(found.problem.whitener, drawing=beside)))
+    along = _with_memory_score(replace(problem, chain=data.chain), found)
+    return look.again(data) if along < _with_memory_score(problem, found) - LEAST_GAIN else state
 
 
-def _with_memory(found: Findings) -> list[Explanation]:
-    """Explanations by a single effect with memory, which depend on where the stage turned."""
-    return [e for e in found.singles if found.problem.effects[e.names[0]].memory]
-
-
-def _refitted_score(found: Findings, data: Observations, tried: list[Explanation]) -> float:
-    """Best score of some explanations, and of no effect, along another path of the input."""
-    along = replace(found.problem, chain=data.chain)
-    refits = [fit(along, e.names, e.values, iterations=20).score for e in tried if e.names]
-    return min([along.nothing().score, *refits])
+def _with_memory_score(problem: Problem, found: Findings) -> float:
+    """Best score of an effect with memory, which depends on where the stage turned, alone and beside other effects."""
+    acting = {name: effect for name, effect in problem.effects.items() if effect.memory}
+    if not acting:
+        return np.inf
+    only = replace(problem, effects=acting)
+    alone = single_effects(only, signatures(only), 7, ROUGH)
+    lasting = [e for e in found.singles if problem.effects[e.names[0]].needs_times and e.names[0] not in acting]
+    bases = {e.names: e.values for e in (found.best, found.nearest, *lasting) if e.names}
+    starts = [{**values, **one.values} for values in bases.values() for one in alone]
+    return min(e.score for e in [*alone, *(fit(problem, tuple(start), start, iterations=7) for start in starts)])
 
 
 def _common_offset(state: Searched, look: Look) -> Searched:
