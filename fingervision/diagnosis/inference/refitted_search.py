@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from fingervision.diagnosis.inference.explanation_candidates import Progress, single_effects
 from fingervision.diagnosis.inference.held_out_prediction import needed
@@ -18,16 +17,10 @@ from fingervision.diagnosis.inference.search_state import ROUGH, Findings
 from fingervision.diagnosis.inference.searched import Look, Searched, problem_of, refitted
 from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.diagnosis.inference.turning_places import beside_turns
-from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 
-BY_ACCIDENT = 1e-3
-"""Probability of the observed or a larger mean of the runs' offsets by chance (Student's t), below which the offsets
-are assumed to have a common cause."""
-LOWERED = 0.9
-"""Largest ratio of the residuals with and without such a common cause for which it is accepted."""
 MOST_SEARCHES = 3
 """Most searches: the second search is nearly always the last, and no repetition is needed if the prediction depends
 linearly on the drawing's dimensions."""
@@ -81,7 +74,6 @@ def refitted_search(
     state = beside_gains(state, look)
     if NAME not in without:
         state = beside_map(state, look)
-    state = _common_offset(state, look)
     return _settled(_beside_drawing(state, look), look)
 
 
@@ -113,28 +105,6 @@ def _with_memory_score(problem: Problem, found: Findings) -> float:
     bases = {e.names: e.values for e in (found.best, found.nearest, *lasting) if e.names}
     starts = [{**values, **one.values} for values in bases.values() for one in alone]
     return min(e.score for e in [*alone, *(fit(problem, tuple(start), start, iterations=7) for start in starts)])
-
-
-def _common_offset(state: Searched, look: Look) -> Searched:
-    """Search again for a constant that is the same in all runs, which the run offsets had absorbed.
-
-    If all runs have nearly the same offset, the offset has a single cause; the spread of the run offsets is then
-    limited to the deviations from their mean.
-    """
-    runs = len(state.data.chain.history.runs)
-    found = state.found
-    if runs < 2 or max(found.best.sigma_mm) == 0.0:
-        return state
-    offsets = found.problem.offsets
-    means = (offsets.metric(found.best.sigma_mm) @ (offsets.design.T @ found.best.residual))[:runs]
-    scatter = float(np.std(means, ddof=1))
-    chance = 2.0 * float(student.sf(abs(means.mean()) / max(scatter / np.sqrt(runs), 1e-300), runs - 1))
-    stands = standing_of(state.data, found)
-    if chance > BY_ACCIDENT and stands.is_little:
-        return state
-    again = look.again(replace(state.data, runs_scatter_mm=scatter), found.best)
-    lower = standing_of(again.data, again.found).after_mm
-    return again if lower < LOWERED * stands.after_mm else state
 
 
 def _beside_drawing(state: Searched, look: Look) -> Searched:

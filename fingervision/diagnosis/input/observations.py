@@ -143,7 +143,6 @@ class Observations:
     position_map: PositionMap | None = None
     run_gains: RunGains | None = None
     roundings: PositionMap | None = None
-    runs_scatter_mm: float = np.inf
     function: FunctionModel | None = None
     turning: TurningErrors | None = None
     turns: UnseenTurns = NO_TURNS
@@ -252,7 +251,6 @@ class Observations:
             self.recorded.samples,
             passing,
             drawing,
-            self.runs_scatter_mm,
         )
         share = FORM_SHARE_OF_RIGS if known else SMALL_SHARE
         offsets = RunOffsets.of(whitener)

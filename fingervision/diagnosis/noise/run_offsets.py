@@ -34,8 +34,6 @@ class RunOffsets:
         Noise of each channel.
     drawn : int
         Number of uncertain dimensions of the drawing.
-    most_mm : float
-        Largest spread of the runs' offsets that is considered.
     """
 
     design: Array
@@ -45,7 +43,6 @@ class RunOffsets:
     midline: bool
     scales_mm: tuple[float, ...]
     drawn: int = 0
-    most_mm: float = np.inf
     _metrics: dict[tuple[float, ...], Array] = field(default_factory=dict, init=False, repr=False)
     _by_spread: list[tuple[Array, Array, Array]] = field(default_factory=list, init=False, repr=False)
 
@@ -57,7 +54,7 @@ class RunOffsets:
         """
         for channel, scale in enumerate(self.scales_mm):
             z = np.maximum(np.diag(self.gram)[channel * self.runs : (channel + 1) * self.runs], 1e-12)
-            spread = np.minimum(scale * SPREADS, self.most_mm)[:, None] ** 2 * z
+            spread = (scale * SPREADS)[:, None] ** 2 * z
             penalty = np.sum(np.log1p(spread), axis=1) + 2.0 * np.log1p(SPREADS**2)
             self._by_spread.append((z, z * spread / (1.0 + spread), penalty))
 
@@ -78,7 +75,7 @@ class RunOffsets:
             columns = np.hstack([columns, whitener.drawing])
         design = whitener.columns(columns)[0]
         scales = tuple(noise.total_mm for noise in whitener.noises)
-        return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn, whitener.runs_scatter_mm)
+        return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn)
 
     def metric(self, sigma_mm: tuple[float, ...]) -> Array:
         """Return G such that r' r - (Z' r)' G (Z' r) is the squared length of r after a fit of the offsets Z."""
@@ -153,7 +150,7 @@ class RunOffsets:
         out, total = [], 0.0
         for scale, determinant, gain in tried:
             best = int(np.argmin(determinant - gain))
-            out.append(min(scale * float(SPREADS[best]), self.most_mm))
+            out.append(scale * float(SPREADS[best]))
             total += float(determinant[best])
         return tuple(out), total
 

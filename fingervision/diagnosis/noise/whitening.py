@@ -34,8 +34,6 @@ class Whitener:
         Standard deviation of the gap due to input errors that differ between samples.
     drawing : ndarray of float, shape (channels * n, p), or None
         Change of the prediction per standard uncertainty of each uncertain dimension of the drawing.
-    runs_scatter_mm : float
-        Largest standard deviation of random offsets between runs.
     """
 
     history: History
@@ -45,7 +43,6 @@ class Whitener:
     input_samples: float
     passing_mm: Array
     drawing: Array | None = None
-    runs_scatter_mm: float = np.inf
     _filter: tuple[Array, Array, float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
