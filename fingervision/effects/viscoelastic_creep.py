@@ -1,9 +1,19 @@
 """Viscoelastic creep: the opening continues to change under a constant input."""
 
-from fingervision.domain.effect import History, PointEffect, Stage, Values, start_key
+import numpy as np
+
+from fingervision.domain.effect import Array, History, PointEffect, Stage, Values, start_key
+from fingervision.domain.loops import filled, loop
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
-from fingervision.effects.low_pass import low_pass
+
+_low_pass = loop("low_pass_low_pass")
+
+
+def low_pass(signal: Array, time_s: Array, tau_s: float, start: float) -> Array:
+    """Low-pass filter one run's signal with time constant `tau_s`, from the state `start`; shape (n,)."""
+    return filled(_low_pass, signal, np.ascontiguousarray(time_s), tau_s, start)
+
 
 TAUS_S = (1, 4, 16, 64)
 SLOWER = 2.0

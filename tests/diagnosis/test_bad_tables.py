@@ -11,7 +11,7 @@ from fingervision.diagnosis.compare import compare
 from fingervision.diagnosis.inference.hypothesis import Explanation
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.plausibility import mixed_rows
-from fingervision.diagnosis.inference.searched import problem_of
+from fingervision.diagnosis.inference.search import problem_of
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.report.sentences import open_parameters
 from fingervision.domain.errors import DataError, ExitCode, FingervisionError

@@ -11,7 +11,7 @@ from fingervision.diagnosis.diagnose import diagnose
 from fingervision.diagnosis.inference.explanation_candidates import within_a_step, without_roundings
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.searched import problem_of
+from fingervision.diagnosis.inference.search import problem_of
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.report import Verdict
 from fingervision.storage.measured_table import read_measured_table

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
-from fingervision.diagnosis.inference.bounded_descent import bounded_step
+from fingervision.diagnosis.inference.hypothesis_fit import bounded_step
 from fingervision.domain.report import Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model

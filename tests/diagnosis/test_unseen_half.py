@@ -8,7 +8,7 @@ import pytest
 from fingervision.diagnosis.design.next_look import lacking, next_look
 from fingervision.diagnosis.inference.held_out_prediction import fails_on_unseen_half, left_out_rms_mm
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.searched import problem_of
+from fingervision.diagnosis.inference.search import problem_of
 from fingervision.diagnosis.inference.verdict import resembling
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare

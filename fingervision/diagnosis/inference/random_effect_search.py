@@ -16,8 +16,8 @@ from fingervision.diagnosis.inference.map_identifiability import (
 )
 from fingervision.diagnosis.inference.position_map import NAME, PositionMap, likeliest_map, why_no_map
 from fingervision.diagnosis.inference.random_effect import FEWEST_RUNS, LEAST_GAIN, RunGains, likeliest_gains
+from fingervision.diagnosis.inference.search import Look, Searched
 from fingervision.diagnosis.inference.search_state import Findings
-from fingervision.diagnosis.inference.searched import Look, Searched
 from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.record_nuisances import below_the_input, mean_slope

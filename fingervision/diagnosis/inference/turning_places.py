@@ -8,8 +8,8 @@ from scipy.optimize import lsq_linear
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
+from fingervision.diagnosis.inference.search import Look, Searched, problem_of, refitted
 from fingervision.diagnosis.inference.search_state import Findings
-from fingervision.diagnosis.inference.searched import Look, Searched, problem_of, refitted
 from fingervision.diagnosis.inference.signatures import derivatives
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.noise_model import Noise
