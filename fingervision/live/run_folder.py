@@ -14,13 +14,14 @@ from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import OwnPacket
 from fingervision.frames.source import Description
-from fingervision.live.run_table import Measured, RunTable
+from fingervision.measuring.run_table import Measured, RunTable
 from fingervision.measuring.task import Task
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.durable import remove_empty
+from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.storage.lost_frames import LOST, LostFrames
 from fingervision.storage.recorded_video import RecordedVideo
-from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, SCHEMA, VIDEO, RunFiles
+from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, SCHEMA, VIDEO, RunFiles, device_of
 
 GAPS = "gaps.csv"
 RUNS = "????-??-??T??-??-??Z*"
@@ -71,7 +72,8 @@ class RunFolder:
             write_calibration(task.scale, self.path / CALIBRATION)
         self._lost = LostFrames(self.path / LOST)
         self._video = RecordedVideo(self.path / VIDEO, template)
-        self._table = RunTable(self.path / GAPS, replace(description, files=(self.path / VIDEO,)), task)
+        self._rows = GapsCsv(self.path / GAPS)
+        self._table = RunTable(replace(description, files=(self.path / VIDEO,)), task, self._rows.add)
         self._last_s = 0.0
         self.event("recording", "Recording began.")
 
@@ -107,7 +109,14 @@ class RunFolder:
         failure: FingervisionError | None = None
         with suppress(FingervisionError):
             self.event("stopped", why)
-        for end in (self._video.close, self._lost.close, self._table.close, self._files.close, self._finish):
+        for end in (
+            self._video.close,
+            self._lost.close,
+            self._table.close,
+            self._rows.close,
+            self._files.close,
+            self._finish,
+        ):
             try:
                 end()
             except FingervisionError as error:
@@ -171,16 +180,7 @@ def _about(description: Description, task: Task, began: datetime) -> dict[str, A
         "software": {"name": "fingervision", "version": __version__},
         "began_at": began.isoformat(timespec="milliseconds"),
         "recipe": None,
-        "device": {
-            "source": description.name,
-            "kind": description.kind,
-            "codec": description.codec,
-            "width_px": description.width_px,
-            "height_px": description.height_px,
-            "rate_hz": description.rate_hz,
-            "camera": dict(description.camera),
-            "notes": list(description.notes),
-        },
+        "device": device_of(description),
         "settings": {
             "below_tip_mm": task.below_tip_mm,
             "tips": "auto" if task.direction is None else task.direction.value,

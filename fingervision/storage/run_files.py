@@ -7,10 +7,25 @@ from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import FingervisionError, OutputError
+from fingervision.frames.source import Description
 from fingervision.storage.durable import flush_open, replaced
 
 RUN, VIDEO, EVENTS, CALIBRATION = "run.json", "video.mp4", "events.jsonl", "calibration.json"
 SCHEMA = 1
+
+
+def device_of(description: Description) -> dict[str, Any]:
+    """What run.json says of the camera; `measure` of the run's video reads its settings there."""
+    return {
+        "source": description.name,
+        "kind": description.kind,
+        "codec": description.codec,
+        "width_px": description.width_px,
+        "height_px": description.height_px,
+        "rate_hz": description.rate_hz,
+        "camera": dict(description.camera),
+        "notes": list(description.notes),
+    }
 
 
 class RunFiles:

@@ -2,6 +2,7 @@
 repeatable.
 """
 
+import csv
 import json
 from pathlib import Path
 
@@ -11,12 +12,10 @@ from click.testing import CliRunner
 
 from fingervision.cli import cli
 from fingervision.domain.with_uncertainty import with_uncertainty
-from fingervision.frames.source import open_source
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.samples_csv import read_samples
 from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.testbed.simulation.injected_effects import Hidden
-from fingervision.vision.pipeline import Settings, measure_frame
 from tests.testbed.simulated_beds import recipe_at, run, steps
 
 # Frames of 640 columns with noise of 2 grey levels: 0.014 px of each gap, 0.4 um. The tolerance is five times that, and
@@ -60,14 +59,37 @@ def test_runs_points_and_clocks_are_as_the_recipe_says(short: Path) -> None:
     assert 0.0 < about["clocks"]["actuator"]["u_s"] < 0.002
 
 
-def test_measuring_the_video_again_gives_the_table(short: Path) -> None:
-    rows = read_samples(short / "samples.csv")
-    frames = list(open_source(str(short / "video.mp4")))
-    assert len(frames) == len(rows)
-    for k in (0, len(rows) // 2, len(rows) - 1):
-        measured = measure_frame(frames[k], Settings(0.3 * 34.0))  # type: ignore[arg-type]
-        assert measured.gap_px / 34.0 == pytest.approx(rows[k].gap_mm, abs=1e-6)  # type: ignore[union-attr]
-        assert frames[k].time_s == pytest.approx(rows[k].time_s, abs=1e-6)
+def test_measuring_the_video_again_gives_the_table(short: Path, tmp_path: Path) -> None:
+    assert_table_is_that_of_its_video(short, tmp_path)
+
+
+def test_the_table_is_measured_by_the_camera_that_measuring_the_video_learns(tmp_path: Path) -> None:
+    camera = Path(__file__).with_name("toned_camera.py").as_posix()
+    bed = tmp_path / "bed.toml"
+    bed.write_text(
+        f'schema = 1\n[actuator]\nkind = "simulated"\n[camera]\nkind = "{camera}"\n[gripper]\n'
+        "[scale]\npx_per_mm = 34.0\n[limits]\nlower_mm = -0.46\nupper_mm = 1.45\ngap_mm = 0.05\n",
+        encoding="utf-8",
+    )
+    run(tmp_path, steps('kind = "triangle"\nfrom_mm = -0.2\nto_mm = 0.6\nspeed_mm_s = 0.5'), bed_name=str(bed))
+    assert_table_is_that_of_its_video(tmp_path / "run", tmp_path / "measured")
+    table = read_measured_table(tmp_path / "run" / "samples.csv")
+    model = read_simulation_table(tmp_path / "run" / "simulation.csv")
+    assert np.max(np.abs(table.gap_mm - model.respond(table.input_mm).gap_mm)) < GAP_MM
+
+
+def assert_table_is_that_of_its_video(folder: Path, out: Path) -> None:
+    rows = read_samples(folder / "samples.csv")
+    command = ["measure", str(folder / "video.mp4"), "--px-per-mm", "34", "--below-tip-mm", "0.3", "--out", str(out)]
+    assert CliRunner().invoke(cli, command).exit_code == 0
+    with (out / "gaps.csv").open(encoding="utf-8") as file:
+        measured = list(csv.DictReader(file))
+    assert len(measured) == len(rows) > 50
+    for row, again in zip(rows, measured, strict=True):
+        assert row.status == again["status"]
+        assert row.time_s == pytest.approx(float(again["time_s"]), abs=1e-6)
+        for name in ("gap_mm", "u_random_mm", "left_mm", "right_mm"):
+            assert getattr(row, name) == pytest.approx(float(again[name]), abs=1e-7), name
 
 
 def test_the_same_run_gives_the_same_table(short: Path, tmp_path: Path) -> None:

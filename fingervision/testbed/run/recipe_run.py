@@ -1,11 +1,13 @@
 """Run a recipe on a test bed: plan it, check it, execute it, record it."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from fingervision.domain.errors import FingervisionError
 from fingervision.domain.recipe import Recipe
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.samples_csv import SampleRow
@@ -83,9 +85,15 @@ class Runner:
             with watch.controls.listening((lambda: None) if replays else actuator.stop):
                 self._execute()
         except BaseException:
-            # Rows that still wait for their position are left out: no reading says where the stage was when it stopped.
-            actuator.stop()
+            try:
+                actuator.stop()
+            finally:
+                # Rows that still wait for their position are left out: no reading says where the stage was when it
+                # stopped. A simulation makes its last frames again.
+                with suppress(FingervisionError):
+                    watch.record.close(with_last=not replays)
             raise
+        watch.record.close()
         return watch.record.counts
 
     def found(self) -> dict[str, Any]:
@@ -253,8 +261,8 @@ def run_recipe(
     controls : Controls, optional
         Controls for pause and stop.
     on_progress, say, on_plan, on_row : callable
-        Called with: seconds done and expected; sentences; the plan before it is executed; every row as it is written,
-        with its picture.
+        Called with: seconds done and expected; sentences; the plan before it is executed; every row once its position
+        is known and before its gap is, with its picture.
 
     Raises
     ------
@@ -272,7 +280,7 @@ def run_recipe(
     planned = plan(recipe, bed.limits, bed.model, at_mm, sight.rate_hz, sight.width_mm)
     check_moves(planned, bed.actuator, bed.limits, at_mm)
     on_plan(planned)
-    folder = BedRunFolder(out, recipe, bed, hidden, before)
+    folder = BedRunFolder(out, recipe, bed, sight, hidden, before)
     try:
         size_px = (sight.camera.description.width_px, sight.camera.description.height_px)
         left = max(sum(planned.seconds) * sight.rate_hz - len(folder.rows), 0.0)

@@ -3,10 +3,12 @@
 import hashlib
 import json
 import shutil
+from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import islice
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -16,18 +18,22 @@ from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import Frame
 from fingervision.domain.model import Model
 from fingervision.domain.recipe import Recipe
+from fingervision.frames.video_file import VideoFile
+from fingervision.measuring.run_table import Measured, RunTable
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.durable import remove_empty
+from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.out_folder import FolderLock, make_out_folder
 from fingervision.storage.plain_file import json_of
 from fingervision.storage.recorded_video import RecordedVideo, frames_in
-from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, SCHEMA, VIDEO, RunFiles
+from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, SCHEMA, VIDEO, RunFiles, device_of
 from fingervision.storage.samples_csv import SampleRow, SamplesCsv, read_samples, write_rows
 from fingervision.storage.simulation_table import write_simulation
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.motion.soft_limits import SoftLimits
 from fingervision.testbed.run.motion_ratio import inputs_within
+from fingervision.testbed.run.synchronised_acquisition import Sight
 from fingervision.testbed.simulation.injected_effects import Hidden
 
 SAMPLES, SIMULATION, RECIPE, JOINED = "samples.csv", "simulation.csv", "recipe.toml", "joined.csv"
@@ -49,7 +55,6 @@ def write_expected(path: Path, model: Model, limits: SoftLimits) -> None:
 
 def about_run(recipe: Recipe[Section], bed: Bed, hidden: Hidden, began_at: datetime) -> dict[str, Any]:
     """Content of run.json at the start of a run."""
-    camera = None if bed.camera is None else bed.camera.description
     return {
         "schema": SCHEMA,
         "kind": KIND,
@@ -59,16 +64,7 @@ def about_run(recipe: Recipe[Section], bed: Bed, hidden: Hidden, began_at: datet
         "recipe": recipe.text,
         "bed": dict(bed.about),
         "bed_digest": digest_of(bed, hidden),
-        "device": None
-        if camera is None
-        else {
-            "source": camera.name,
-            "kind": camera.kind,
-            "width_px": camera.width_px,
-            "height_px": camera.height_px,
-            "rate_hz": camera.rate_hz,
-            "notes": list(camera.notes),
-        },
+        "device": None if bed.camera is None else device_of(bed.camera.description),
         "settings": {"below_tip_mm": bed.below_tip_mm, "tips": "auto", "roi": None},
         "scale": {
             "px_per_mm": None if bed.scale is None else bed.scale.px_per_mm,
@@ -198,6 +194,8 @@ class BedRunFolder:
         The recipe that is run.
     bed : Bed
         The test bed.
+    sight : Sight
+        Its camera, and the settings of the measurement.
     hidden : Hidden
         Injected effects, whose hash is stored: a simulation with other effects counts as another test bed.
     before : sequence of SampleRow
@@ -210,9 +208,12 @@ class BedRunFolder:
     """
 
     def __init__(
-        self, path: Path, recipe: Recipe[Section], bed: Bed, hidden: Hidden, before: Sequence[SampleRow] = ()
-    ) -> None:
+        self, path: Path, recipe: Recipe[Section], bed: Bed, sight: Sight, hidden: Hidden,
+        before: Sequence[SampleRow] = (),
+    ) -> None:  # fmt: skip
         self.path, self.before = path, tuple(before)
+        self.measured: deque[GapRow] = deque()
+        """Rows of the frames as `measure` gives them, in order; they come some frames late."""
         make_out_folder(path)
         self._lock = FolderLock(path)
         try:
@@ -232,6 +233,11 @@ class BedRunFolder:
             if bed.model is not None and SIMULATION not in kept:
                 write_expected(path / SIMULATION, bed.model, bed.limits)
             self._samples = SamplesCsv(path / SAMPLES, tuple(bed.channels), go_on=bool(self.rows))
+            self.table = RunTable(replace(sight.camera.description, files=(path / VIDEO,)), sight.task, self._take)
+            if self.rows:
+                # The camera is learnt from the first frames, and each frame is judged by those before it.
+                for item in islice(VideoFile(str(path / VIDEO)), len(self.rows)):
+                    self.table.add(item, None)
             self._video = RecordedVideo(path / VIDEO, None, keep=len(self.rows))
         except FingervisionError:
             self._lock.release()
@@ -244,9 +250,10 @@ class BedRunFolder:
         except BaseException:
             self._lock.release()
             raise
-        self._last_s = self.rows[-1].time_s if self.rows else 0.0
+        self.last_s = self.rows[-1].time_s if self.rows else 0.0
+        """Time of the last frame whose position is known (s)."""
         if earlier:
-            self._files.event({"time_s": self._last_s, "event": "resumed", "words": f"After {len(self.rows)} frames."})
+            self._files.event({"time_s": self.last_s, "event": "resumed", "words": f"After {len(self.rows)} frames."})
 
     def needs_room(self, frames: float, size_px: tuple[int, int]) -> None:
         """Refuse a run for which the disk has not enough space."""
@@ -258,19 +265,22 @@ class BedRunFolder:
                 "free disk space, or name a folder on another disk. Nothing was moved."
             )
 
-    def add_picture(self, frame: Frame, time_s: float) -> None:
-        """Write a frame's picture, with its time in the run."""
-        self._video.add(replace(frame, time_s=time_s), ())
+    def add_picture(self, frame: Frame, time_s: float, number: int, seen: Measured) -> None:
+        """Write a frame's picture, with its time in the run; `measured` gets its row later."""
+        in_video_s = self._video.add(replace(frame, time_s=time_s), ())
+        self.table.add(replace(frame, index=number, time_s=in_video_s), seen)
 
     def add_row(self, row: SampleRow) -> None:
         """Write a frame's row, after its picture."""
         self._samples.add((row,))
-        self._last_s = row.time_s
+
+    def _take(self, rows: Sequence[GapRow]) -> None:
+        self.measured.extend(row for row in rows if row.frame >= len(self.rows))
 
     def event(self, number: int, name: str, words: str, **more: object) -> None:
         """Append an event; events written before an interruption are not written again."""
         if number >= len(self.events_done):
-            self._files.event({"n": number, "time_s": round(self._last_s, 6), "event": name, "words": words, **more})
+            self._files.event({"n": number, "time_s": round(self.last_s, 6), "event": name, "words": words, **more})
 
     def finish(self, found: Mapping[str, Any]) -> None:
         """Close the folder of a completed run."""
@@ -288,7 +298,9 @@ class BedRunFolder:
     def break_off(self, why: str) -> None:
         """Close the folder of an interrupted run; its content remains valid, and the run may be continued."""
         with suppress(FingervisionError):
-            self._files.event({"time_s": round(self._last_s, 6), "event": "stopped", "words": why})
+            self.table.close()
+        with suppress(FingervisionError):
+            self._files.event({"time_s": round(self.last_s, 6), "event": "stopped", "words": why})
         with suppress(FingervisionError):
             self._end()
         with suppress(FingervisionError):

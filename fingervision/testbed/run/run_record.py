@@ -3,9 +3,13 @@
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
+from fingervision.domain.camera import CameraModel
 from fingervision.domain.effect import REZEROED
 from fingervision.domain.frame import Frame
+from fingervision.measuring.camera_learning import WANTED
+from fingervision.measuring.run_table import Measured
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.samples_csv import MM_PLACES, SampleRow, row_with
 from fingervision.testbed.run.run_folder import BedRunFolder
@@ -16,12 +20,14 @@ from fingervision.testbed.run.synchronised_acquisition import Look
 PAUSE_S, GAP_S = 5.0, 1.0
 # Word in the label of a run in which the part is turned by 180 degrees.
 TURNED = "turned"
+# Columns that are those of gaps.csv.
+OF_GAP = ("gap_mm", "left_mm", "right_mm", "u_gap_mm", "u_random_mm")
 
 PlaceAt = Callable[[float, bool], float | None]
 """Function that returns the stage's position at a time of the test bed; None if later readings will determine it, and
 it is not needed at once."""
 OnRow = Callable[[SampleRow, Frame], None]
-"""Function that is called with every row that was written, and its picture."""
+"""Function that is called with every row once its position is known, with its picture; its gap is measured later."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +49,7 @@ class RunRecord:
     place_at : callable
         Position of the stage as a function of time.
     on_row : callable, optional
-        Called with every row as it is written, and its picture.
+        Called with every row as soon as its position is known, and its picture.
     """
 
     def __init__(self, folder: BedRunFolder, place_at: PlaceAt, on_row: OnRow = lambda row, picture: None) -> None:
@@ -55,7 +61,9 @@ class RunRecord:
         # the start of this run.
         self._zero_s: float | None = None
         self._base_s = 0.0
+        # Rows that wait for their position, and those that wait for their gap.
         self._waiting: deque[tuple[SampleRow, float, Frame]] = deque()
+        self._placed: deque[SampleRow] = deque()
 
     @property
     def counts(self) -> Counts:
@@ -106,24 +114,35 @@ class RunRecord:
             return None
         row = self.folder.rows[self._rows]
         self._zero_s = row.camera_s - row.time_s
-        self._count(row)
+        self._rows += 1
+        self._with_gap += row.gap_mm is not None
         return GapRow(0, row.time_s, row.status, gap_mm=row.gap_mm, u_random_mm=row.u_random_mm)
 
-    def add(self, look: Look, picture: Frame, measured: GapRow, step: int) -> None:
-        """Add a frame; its row is written once the stage's position is known."""
+    def camera(self, *, wait: bool) -> CameraModel | None:
+        """Camera learnt from the first frames of the folder; None before.
+
+        A simulation waits for it once there are enough frames, so that the same frames are measured by it in every run.
+        """
+        table = self.folder.table
+        if not wait:
+            return table.camera
+        return table.camera_once_learnt() if self._rows >= WANTED else None
+
+    def add(self, look: Look, picture: Frame, seen: Measured, step: int) -> None:
+        """Add a frame, and what was measured in it at once; its row is written once position and gap are known."""
         if self._zero_s is None:
             self._zero_s = look.shot.device_s - self._base_s
         row = row_with(tuple(look.channels))(
             run=self.label,
             time_s=round(look.shot.device_s - self._zero_s, 6),
             input_mm=None,
-            gap_mm=_rounded(measured.gap_mm),
-            left_mm=_rounded(measured.left_mm),
-            right_mm=_rounded(measured.right_mm),
-            u_gap_mm=_rounded(measured.u_gap_mm),
-            u_random_mm=_rounded(measured.u_random_mm),
+            gap_mm=None,
+            left_mm=None,
+            right_mm=None,
+            u_gap_mm=None,
+            u_random_mm=None,
             force_n=look.force_n,
-            status=measured.status,
+            status=seen[1].status,
             frame=self._rows,
             step=step,
             encoder_mm=_rounded(look.encoder_mm),
@@ -131,25 +150,41 @@ class RunRecord:
             arrived_s=round(look.shot.arrived_s, 6),
             **look.channels,
         )
-        self.folder.add_picture(picture, row.time_s)
+        self.folder.add_picture(picture, row.time_s, row.frame, seen)
         self._waiting.append((row, look.exposed_s, picture))
-        self._count(row)
+        self._rows += 1
 
     def lose(self) -> None:
         """Count a frame that could not be read."""
         self._lost += 1
 
     def write(self, *, at_once: bool = False) -> None:
-        """Write the rows whose interpolated stage position is known by now, or all rows."""
+        """Write the rows whose interpolated stage position (`at_once`: that of all frames) and gap are known by now."""
         while self._waiting:
             row, exposed_s, picture = self._waiting[0]
             input_mm = self._place_at(exposed_s, at_once)
             if input_mm is None:
-                return
+                break
             row = replace(row, input_mm=round(input_mm, MM_PLACES))
-            self.folder.add_row(row)
+            self._placed.append(row)
+            self.folder.last_s = row.time_s
             self._waiting.popleft()
             self._on_row(row, picture)
+        while self._placed and self.folder.measured:
+            row, measured = self._placed.popleft(), self.folder.measured.popleft()
+            values: dict[str, Any] = {name: _rounded(getattr(measured, name)) for name in OF_GAP}
+            self.folder.add_row(replace(row, status=measured.status, **values))
+            self._with_gap += measured.gap_mm is not None
+
+    def close(self, *, with_last: bool = True) -> None:
+        """End the measurement, and write the rows of frames with a position.
+
+        `with_last` includes the last frames, which are then judged without those that would have followed.
+        """
+        self.write()
+        self.folder.table.close()
+        if with_last:
+            self.write()
 
     # Events.
 
@@ -157,10 +192,6 @@ class RunRecord:
         """Write an event, once."""
         self.folder.event(self._events, name, words, **more)
         self._events += 1
-
-    def _count(self, row: SampleRow) -> None:
-        self._rows += 1
-        self._with_gap += row.gap_mm is not None
 
 
 def _run_number(row: SampleRow) -> int:

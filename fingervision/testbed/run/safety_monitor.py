@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from time import sleep
 
 from fingervision.domain.errors import DeviceError, LimitError, StateError
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import LostFrame
+from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.bed import Bed
@@ -95,14 +96,21 @@ class Watch:
             As in `look`, or the gap is beyond its limit.
         """
         look = self.look()
-        if record and (there := self.record.there_already()) is not None:
+        there = self.record.there_already() if record else None
+        # Contact ends a motion by what was seen in the frame at once, which the table need not repeat.
+        if there is not None and not self._closes:
             return look, there
         item = look.shot.item()
-        measured, _ = self.sight.measure(item)
-        if record and isinstance(item, Frame):
-            self.record.add(look, item, measured, 0 if self.leg is None else self.leg.step)
-        elif record:
+        self.sight.know(self.record.camera(wait=self.bed.replays))
+        measured, outcome = self.sight.measure(item)
+        if there is not None:
+            return look, measured
+        if not record:
+            pass
+        elif isinstance(item, LostFrame) or isinstance(outcome, LostFrame):
             self.record.lose()
+        else:
+            self.record.add(look, item, (self.sight.settings, outcome), 0 if self.leg is None else self.leg.step)
         self.record.write()
         gap_mm = measured.gap_mm
         if self.ratio is not None and gap_mm is not None and self.leg is not None and isinstance(self.leg.act, Go):
@@ -120,9 +128,10 @@ class Watch:
         """Refuse to continue if the camera does not show both fingers."""
         words = ""
         for _ in range(FRAMES_TO_FIND_FINGERS):
-            measured, words = self.sight.measure(self.look().shot.item())
+            measured, outcome = self.sight.measure(self.look().shot.item())
             if measured.status is Status.OK:
                 return
+            words = "" if isinstance(outcome, GapMeasurement) else outcome.words
         raise DeviceError(
             f"The camera must show both fingers before anything moves, but does not: {words} Bring both fingers into "
             "the picture (camera, light, focus), and run the recipe again."

@@ -2,14 +2,16 @@
 
 from collections import deque
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fingervision.domain.camera import CameraModel
 from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
-from fingervision.domain.gap import NoGap
+from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.measuring.rows import Result, RowMaker
+from fingervision.measuring.task import Task, task_for_frames
 from fingervision.motion.encoder_interpolation import StageTrack
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.actuator import Actuator
@@ -19,7 +21,7 @@ from fingervision.testbed.clocks.synchronisation import ArrivalClock, ClockJoin
 from fingervision.testbed.force_sensor import ForceSensor
 from fingervision.testbed.reading import Reading
 from fingervision.testbed.text_protocol.sensor import TextSensor
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import measure_frame
 
 # Number of readings that are kept: at 200 readings per second they cover far more than the latency of a frame.
 READINGS_KEPT = 2000
@@ -176,8 +178,11 @@ class Sight:
                 "A run must have a scale, but the test bed has none: add a [scale] with px_per_mm or a calibration."
             )
         description = bed.camera.description
-        bed.scale.check_frame_size(description.width_px, description.height_px)
         self.camera: BedCamera = bed.camera
+        self.task = task_for_frames(Task(bed.scale, below_tip_mm=bed.below_tip_mm), description)
+        """Settings of the measurement, as those of a recording."""
+        self.settings = self.task.settings
+        """Settings for the image processing, with the camera as it is assumed until `know` states another."""
         self.rate_hz = description.rate_hz or 25.0
         self.width_mm = description.width_px / bed.scale.px_per_mm
         self.position = Position(bed.actuator)
@@ -186,8 +191,7 @@ class Sight:
         self.camera_clock = ArrivalClock(bed.camera.latency)
         # A test bed that replays has the position at all times.
         self._ready = None if bed.replays else getattr(bed.camera, "ready", None)
-        self._settings = Settings(bed.below_tip_mm * bed.scale.px_per_mm)
-        self._rows = RowMaker(bed.scale, (description.width_px, description.height_px))
+        self._rows = RowMaker(self.task.scale, (description.width_px, description.height_px))
 
     def look(self) -> Look:
         """Wait for the next frame, read the position meanwhile, and all instruments after its arrival."""
@@ -217,8 +221,13 @@ class Sight:
                 clocks[name] = {"offset_s": joined.host_s - joined.board_s, "rate": joined.rate, "u_s": u_s}
         return clocks
 
-    def measure(self, item: Frame | LostFrame) -> tuple[GapRow, str]:
-        """Measure a picture: return its row and, if there is no measured gap, the reason as a sentence."""
-        outcome = item if isinstance(item, LostFrame) else measure_frame(item, self._settings)
+    def know(self, camera: CameraModel | None) -> None:
+        """Measure the following pictures by a camera that was learnt; None changes nothing."""
+        if camera is not None:
+            self.settings = replace(self.settings, camera=camera)
+
+    def measure(self, item: Frame | LostFrame) -> tuple[GapRow, GapMeasurement | NoGap | LostFrame]:
+        """Measure a picture: return its row, and the result from which the row was made."""
+        outcome = item if isinstance(item, LostFrame) else measure_frame(item, self.settings)
         (row,) = self._rows.rows((Result(item.index, item.time_s, outcome),))
-        return row, outcome.words if isinstance(outcome, NoGap | LostFrame) else ""
+        return row, outcome

@@ -1,17 +1,16 @@
 """The table of a run: measured while the run is recorded, from its own frames, as `measure` does it afterwards.
 
-A recording has one camera, which is learnt from its first frames, and every frame is judged by those beside it. The
-live view cannot wait for either, but the table of a run can: it is written by the loop that measures recordings, so
-that both give the same rows. What the live view has measured with the same settings is not measured again.
+A recording has one camera, which is learnt from its first frames, and every frame is judged by those beside it. A live
+view and a test bed cannot wait for either, but the table of a run can: its rows come from the loop that measures
+recordings, so that both give the same. What has been measured with the same settings already is not measured again.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 from queue import Full, Queue
-from threading import Thread
+from threading import Event, Thread
 
 from fingervision.domain.camera import CameraModel
 from fingervision.domain.frame import Coding, Frame, LostFrame
@@ -21,7 +20,7 @@ from fingervision.measuring.frame_loop import measure_frames, prepared
 from fingervision.measuring.rows import Result
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.task import Task
-from fingervision.storage.gaps_csv import GapRow, GapsCsv
+from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.pipeline import Settings, measure_frame
 
 # Memory (bytes) and least number of frames that wait for the measurement: the camera is learnt in half a second on a
@@ -33,33 +32,28 @@ Measured = tuple[Settings, GapMeasurement | NoGap]
 
 
 class RunTable:
-    """Measures the frames of a run in a thread of its own, and writes their rows.
+    """Measures the frames of a run in a thread of its own, and passes on their rows.
 
     Parameters
     ----------
-    path : Path
-        The table.
     description : Description
         Description of the recording, with its file.
     task : Task
         Settings of the measurement.
-
-    Raises
-    ------
-    OutputError
-        The table cannot be written; every method may raise this error.
+    take : callable
+        Called with the rows, in order, in the thread; an error that it raises is raised by `add` and `close`.
     """
 
-    def __init__(self, path: Path, description: Description, task: Task) -> None:
-        self._description, self._task = description, task
+    def __init__(self, description: Description, task: Task, take: Callable[[Sequence[GapRow]], None]) -> None:
+        self._description, self._task, self._take_rows = description, task, take
         self.camera: CameraModel | None = None
         """Camera of the recording; None until it is learnt."""
-        self._rows = GapsCsv(path)
         self._waiting: Queue[Frame | LostFrame | None] = Queue(
             max(FRAMES_WAITING, MEMORY_WAITING // (description.width_px * description.height_px))
         )
         self._seen: dict[int, tuple[Coding, Measured]] = {}
         self._failure: Exception | None = None
+        self._learnt = Event()
         self._thread = Thread(target=self._measure, name="Table", daemon=True)
         self._thread.start()
 
@@ -71,11 +65,15 @@ class RunTable:
         if self._failure is not None:
             raise self._failure
 
+    def camera_once_learnt(self) -> CameraModel | None:
+        """Wait until the camera is learnt; at least `camera_learning.WANTED` frames must have been added."""
+        self._learnt.wait()
+        return self.camera
+
     def close(self) -> None:
-        """Write the rows of all frames that wait, and close the table."""
+        """Measure all frames that wait, and end the thread."""
         self._put(None)
         self._thread.join()
-        self._rows.close()
         if self._failure is not None:
             raise self._failure
 
@@ -98,12 +96,15 @@ class RunTable:
             )
         except Exception as error:  # raised where the next frame is added
             self._failure = error
+        finally:
+            self._learnt.set()
 
     def _take(self, _: Sequence[Result], rows: Sequence[GapRow]) -> None:
-        self._rows.add(rows)
+        self._take_rows(rows)
 
     def _outcome(self, frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
         self.camera = settings.camera
+        self._learnt.set()
         coding, seen = self._seen.pop(frame.index, (None, None))
         if seen is not None and coding is frame.coding and _holds(*seen, settings):
             return seen[1]
