@@ -10,7 +10,7 @@ perspective that the calibration knows. With `lossy` the pictures are JPEG of qu
 another level lies over a part of a moving body.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import cv2
@@ -28,7 +28,7 @@ from fingervision.measuring.drawing_placement import GivenPoint
 from fingervision.measuring.scale import Scale
 from fingervision.storage.mechanism_toml import mechanism_from_tables
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.diagnosis.lever_drawing import TABLES
 
 Array = NDArray[np.float64]
@@ -167,11 +167,32 @@ def scale_of(kind: str, rng: np.random.Generator) -> tuple[Scale, float, float]:
     return made, float(rng.normal(SCALE, u_scale)), float(rng.normal(bias, u_bias))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def hand(clean: Array, truth: Truth, rng: np.random.Generator) -> None:
+    """Cover a disc of 6 to 10 mm about a point of a moving body's outline, with an edge blurred by 3 px."""
+    at = np.array([(18.0, 70.0), (10.0, 60.0), (28.0, 50.0), (22.0, 20.0)][int(rng.integers(4))])
+    away = at - MIDDLE_MM
+    c, s, side = np.cos(truth.angle), np.sin(truth.angle), 1.0 if truth.is_mirrored else -1.0
+    x, y = np.array([c * away[0] - side * s * away[1], s * away[0] + side * c * away[1]]) * truth.scale + truth.shift_px
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    share = ndtr((rng.uniform(6.0, 10.0) * truth.scale - np.hypot(columns - x, rows - y)) / 3.0)
+    clean += share * (rng.uniform(90.0, 170.0) - clean)
+
+
+def given_point(truth: Truth, scale: Scale, at: tuple[float, float], rng: np.random.Generator) -> GivenPoint:
+    side = 1.0 if truth.is_mirrored else -1.0
+    away = np.array(at) - MIDDLE_MM
+    c, s = np.cos(truth.angle), np.sin(truth.angle)
+    turned = np.array([c * away[0] - side * s * away[1], s * away[0] + side * c * away[1]])
+    px = (turned * truth.scale + truth.shift_px)[None, :]
+    if isinstance(scale, Calibration):
+        px = scale.unflatten(px)
+    x, y = px[0] + rng.uniform(-1.0, 1.0, 2)
+    return GivenPoint(float(x), float(y), *at)
+
+
+@benchmark(cases=60, seed=1, kinds={"nargs": "+", "default": ["bare", "calibrated", "lens", "lossy"]})
+def main(given: Namespace) -> None:
     """Print the coverage of every kind."""
-    given = options_of(
-        __doc__, arguments, cases=60, seed=1, kinds={"nargs": "+", "default": ["bare", "calibrated", "lens", "lossy"]}
-    )
     centroids = {name: centroid(name) for name in BOXES}
     for kind in given.kinds:
         rng = np.random.default_rng([given.seed, len(kind)])
@@ -224,30 +245,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
             print(f"  {part}: {100 * np.mean(np.abs(z) < 1.96):.1f} % of {z.size} within 1.96 u (RMS of error / u "
                   f"{np.sqrt(np.mean(z**2)):.2f}, largest {np.abs(z).max():.1f}); by the frame's own part alone "
                   f"{100 * np.mean(np.abs(r) < 1.96):.1f} %", flush=True)  # fmt: skip
-
-
-def hand(clean: Array, truth: Truth, rng: np.random.Generator) -> None:
-    """Cover a disc of 6 to 10 mm about a point of a moving body's outline, with an edge blurred by 3 px."""
-    at = np.array([(18.0, 70.0), (10.0, 60.0), (28.0, 50.0), (22.0, 20.0)][int(rng.integers(4))])
-    away = at - MIDDLE_MM
-    c, s, side = np.cos(truth.angle), np.sin(truth.angle), 1.0 if truth.is_mirrored else -1.0
-    x, y = np.array([c * away[0] - side * s * away[1], s * away[0] + side * c * away[1]]) * truth.scale + truth.shift_px
-    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
-    share = ndtr((rng.uniform(6.0, 10.0) * truth.scale - np.hypot(columns - x, rows - y)) / 3.0)
-    clean += share * (rng.uniform(90.0, 170.0) - clean)
-
-
-def given_point(truth: Truth, scale: Scale, at: tuple[float, float], rng: np.random.Generator) -> GivenPoint:
-    side = 1.0 if truth.is_mirrored else -1.0
-    away = np.array(at) - MIDDLE_MM
-    c, s = np.cos(truth.angle), np.sin(truth.angle)
-    turned = np.array([c * away[0] - side * s * away[1], s * away[0] + side * c * away[1]])
-    px = (turned * truth.scale + truth.shift_px)[None, :]
-    if isinstance(scale, Calibration):
-        px = scale.unflatten(px)
-    x, y = px[0] + rng.uniform(-1.0, 1.0, 2)
-    return GivenPoint(float(x), float(y), *at)
-
-
-if __name__ == "__main__":
-    main()

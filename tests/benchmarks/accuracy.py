@@ -8,7 +8,6 @@ one and within two of the stated `u_gap_px`, which must be 68 and 95 %.
 """
 
 import io
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from tempfile import NamedTemporaryFile
@@ -19,12 +18,12 @@ import numpy as np
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame, Pixels
-from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.quantiser import Quantiser
 from fingervision.frames.video_file import VideoFile
 from fingervision.rendering import Camera, Light, Scene, SquareTip, render, truth, two_fingers
-from fingervision.vision.pipeline import Settings, measure_frame
-from tests.benchmarks.options import options_of
+from fingervision.vision.pipeline import Settings
+from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.scores import BEYOND_PX, Scores, percent, rms
 
 PX_PER_MM = 34.0
 BELOW_PX = 0.3 * PX_PER_MM
@@ -193,43 +192,31 @@ def cases(name: str, rng: np.random.Generator) -> Iterator[Case]:
         yield SINGLE[name](rng)
 
 
-def run(name: str, frames: int, seed: int) -> tuple[str, np.ndarray, np.ndarray]:
-    rng = np.random.default_rng([seed, sum(map(ord, name))])
-    source = cases(name, rng)
-    errors, stated, lost, seconds = [], [], {}, 0.0
-    for number in range(frames):
-        case = next(source)
-        settings = Settings(BELOW_PX, None if name == "turned" else Direction.UP)
-        start = time.perf_counter()
-        found = measure_frame(Frame(case.pixels, number, coding=case.coding, quantiser=case.quantiser), settings)
-        seconds += time.perf_counter() - start
-        if isinstance(found, GapMeasurement):
-            errors.append(found.gap_px - case.gap_px)
-            stated.append(found.u_gap_px)
-        else:
-            lost[str(found.status)] = lost.get(str(found.status), 0) + 1
-    e, u = np.array(errors), np.array(stated)
-    z = np.abs(e) / u
-    line = (
-        f"{name:15s} {len(e):5d} {np.sqrt(np.mean(e**2)):8.4f} {e.mean():+8.4f} {np.abs(e).max():8.4f} "
-        f"{100 * len(e) / frames:6.1f} {100 * np.mean(np.abs(e) > 0.25):6.1f} {np.median(u):8.4f} "
-        f"{100 * np.mean(z < 1):6.1f} {100 * np.mean(z < 2):6.1f} {1e3 * seconds / frames:6.2f} {lost or ''}"
+def scored(name: str, frames: int, seed: int) -> Scores:
+    source, scores = cases(name, np.random.default_rng([seed, sum(map(ord, name))])), Scores()
+    settings = Settings(BELOW_PX, None if name == "turned" else Direction.UP)
+    for number, case in zip(range(frames), source, strict=False):
+        frame = Frame(case.pixels, number, coding=case.coding, quantiser=case.quantiser)
+        scores.measure(frame, settings, case.gap_px)
+    return scores
+
+
+def line(name: str, of: Scores, frames: int) -> str:
+    e, z = of.error, np.abs(of.error) / of.columns[1]
+    return (
+        f"{name:15s} {len(e):5d} {rms(e):8.4f} {e.mean():+8.4f} {np.abs(e).max():8.4f} {100 * len(e) / frames:6.1f} "
+        f"{percent(np.abs(e) > BEYOND_PX):6.1f} {np.median(of.columns[1]):8.4f} {percent(z < 1):6.1f} "
+        f"{percent(z < 2):6.1f} {1e3 * of.seconds / frames:6.2f} {of.refused}"
     )
-    return line, e, u
 
 
-def main() -> None:
-    options = options_of(__doc__, frames=200, seed=1, only={"nargs": "*"})
+@benchmark(frames=200, seed=1, only={"nargs": "*"})
+def main(options: Namespace) -> None:
     print("class           frames   RMS px    mean px   max px  value% >.25%  median u  <1u %  <2u %  ms")
     within = []
     for name in options.only or [*SINGLE, "h264"]:
-        line, e, u = run(name, options.frames, options.seed)
-        within.append(np.abs(e) / u)
-        print(line, flush=True)
+        found = scored(name, options.frames, options.seed)
+        within.append(np.abs(found.error) / found.columns[1])
+        print(line(name, found, options.frames), flush=True)
     z = np.concatenate(within)
-    one, two = (100 * np.mean(z < k) for k in (1, 2))
-    print(f"all             {len(z):5d}  within one u {one:.1f} %, within two {two:.1f} %")
-
-
-if __name__ == "__main__":
-    main()
+    print(f"all             {len(z):5d}  within one u {percent(z < 1):.1f} %, within two {percent(z < 2):.1f} %")

@@ -29,7 +29,7 @@ from fingervision.batch.task import CURVE_POINTS, Digest
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.rendering.clip import H264, write_clip
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark, told
 
 ROUNDS = 3
 LEAST_RATIO, MOST_S, MOST_MB = 1.7, 10.0, 300.0
@@ -79,11 +79,6 @@ def tables_of(out: Path) -> list[str]:
     """Hashes of every table and figure."""
     files = sorted([*out.glob("*/gaps.csv"), *out.glob("*/gap.png")])
     return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files]
-
-
-def told(what: str, figure: str, bar: str = "", met: bool | None = None) -> None:
-    """Print a line of the table: what, how much, the bar, and whether it is met."""
-    print(f"{what:58} {figure:>20}  {bar:22} {'' if met is None else 'met' if met else 'MISSED'}", flush=True)
 
 
 def workers(folder: Path, recordings: int, frames: int) -> float:
@@ -158,16 +153,12 @@ def finished(folder: Path, count: int) -> None:
     told("index.html", f"{(out / 'index.html').stat().st_size / 1e6:.1f} MB")
 
 
-def main() -> None:
+@benchmark(recordings=12, frames=1500, finished=10000)
+def main(chosen: Namespace) -> None:
     """Read the options and print."""
-    chosen = options_of(__doc__, recordings=12, frames=1500, finished=10000)
     with TemporaryDirectory() as name:
         rate_hz = workers(Path(name), chosen.recordings, chosen.frames)
         finished(Path(name), chosen.finished)
     hours = FRAMES_OF_TEN_MINUTES / rate_hz / 3600.0
     for count in (100, 10000):
         told(f"{count} recordings of ten minutes at 25 frames/s, calculated", f"{count * hours:.1f} core hours")
-
-
-if __name__ == "__main__":
-    main()

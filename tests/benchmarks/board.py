@@ -21,7 +21,7 @@ import numpy as np
 from fingervision.domain.board_settings import Role
 from fingervision.testbed.board.board import Board, opened
 from fingervision.testbed.board.wire import Levels
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.testbed.emulated_board import WIRING, EmulatedBoard, MotorController, compiled, missing_tools, running
 
 EDGES, SILENCES = 12, 5
@@ -90,9 +90,9 @@ def silences(emulated: EmulatedBoard) -> None:
     )
 
 
-def main() -> None:
+@benchmark(seconds=60.0, slower=1)
+def main(options: Namespace) -> None:
     """Run all measurements, and print the results."""
-    options = options_of(__doc__, seconds=60.0, slower=1)
     why = missing_tools()
     if why is not None:
         sys.exit(f"The emulated board {why}.")
@@ -106,7 +106,3 @@ def main() -> None:
         controller.close()
     used = resource.getrusage(resource.RUSAGE_SELF)
     print(f"client and measuring: {used.ru_utime + used.ru_stime:.1f} s of processor time")
-
-
-if __name__ == "__main__":
-    main()

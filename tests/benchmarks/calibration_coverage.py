@@ -33,7 +33,7 @@ from fingervision.rendering.scene import Patch, Scene
 from fingervision.rendering.targets import bar, slot
 from fingervision.rendering.two_fingers import two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 FRAME = (640, 480)
 U_SIZE_MM = 0.001
@@ -129,15 +129,14 @@ def interval(held: int, count: int) -> str:
     return f"{100 * held / count:5.1f} % ({100 * low:.1f} to {100 * high:.1f})"
 
 
-def main() -> None:
-    wish = options_of(
-        __doc__,
-        trials=1000,
-        jobs=2,
-        seed=20261,
-        radius_mm={"type": float, "default": 0.2, "help": "Of the tips; 0.5 shows what a curved edge adds."},
-        drawn={"choices": ("normal", "even"), "action": "append", "help": "Only this; both by default."},
-    )
+@benchmark(
+    trials=1000,
+    jobs=2,
+    seed=20261,
+    radius_mm={"type": float, "default": 0.2, "help": "Of the tips; 0.5 shows what a curved edge adds."},
+    drawn={"choices": ("normal", "even"), "action": "append", "help": "Only this; both by default."},
+)
+def main(wish: Namespace) -> None:
     seeds = [wish.seed * 100_000 + number for number in range(wish.trials)]
     for shape in wish.drawn or ("normal", "even"):
         with ProcessPoolExecutor(wish.jobs) as pool:
@@ -155,7 +154,3 @@ def main() -> None:
             rms, u = 1e3 * float(np.sqrt(np.mean(rows[:, 0] ** 2))), 1e3 * float(np.sqrt(np.mean(rows[:, 1] ** 2)))
             shares = f"{interval(held, len(rows)):<24} {interval(bare, len(rows)):<36}"
             print(f"{name:<18} {len(rows):>5}  {shares} {rms:7.2f} {u:7.2f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -5,7 +5,7 @@
 
 from collections import Counter
 from dataclasses import asdict, dataclass
-from time import monotonic, process_time
+from time import process_time
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from fingervision.motion.clock.clock_offset import NoClockOffset
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks import drawn_recordings
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark, in_turn
 
 FINE_HZ = 2000.0
 WIDEST_PX, FRAME_PX, BELOW_PX = 230.0, (360, 120), 10.2
@@ -160,23 +160,19 @@ def of_pictures(seed):
     return Drawn(np.array(times), np.array(gaps), drive, kind.offset_s, kind.rate, 1.0 / kind.frame_hz, words)
 
 
-def main():
-    asked = options_of(
-        __doc__,
-        series=50,
-        seed=1,
-        laboratory={"action": "store_true", "help": "draw the recordings of drawn_recordings.py"},
-        rendered={"action": "store_true", "help": "render their frames, and measure the gap in these"},
-        minutes=10.0,
-        verbose=False,
-    )
+@benchmark(
+    series=50,
+    seed=1,
+    laboratory={"action": "store_true", "help": "draw the recordings of drawn_recordings.py"},
+    rendered={"action": "store_true", "help": "render their frames, and measure the gap in these"},
+    minutes=10.0,
+    verbose=False,
+)
+def main(asked: Namespace) -> None:
     rng = np.random.default_rng(asked.seed)
     tally = Counter()
     scores, seconds = [], []
-    begun = monotonic()
-    for number in range(asked.series):
-        if monotonic() - begun > 60.0 * asked.minutes:
-            break
+    for number in in_turn(range(asked.series), asked.minutes):
         of_seed = of_pictures if asked.rendered else of_laboratory
         case = of_seed(1000 * asked.seed + number) if asked.laboratory or asked.rendered else draw(rng)
         begin = process_time()
@@ -209,7 +205,3 @@ def main():
     share = tally["within 2u"] / max(len(scores), 1)
     print(f"answered: {len(scores)}, within 2u: {share:.3f}, RMS score {np.sqrt(np.mean(np.square(scores))):.2f}")
     print(f"seconds of processor time: median {np.median(seconds):.2f}, largest {max(seconds):.2f}")
-
-
-if __name__ == "__main__":
-    main()

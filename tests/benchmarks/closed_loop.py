@@ -26,7 +26,7 @@ from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testbed.run.run_folder import JOINED, SAMPLES, SIMULATION, rows_before, times_of
 from fingervision.testbed.simulation.injected_effects import Hidden
 from fingervision.testbed.simulation.parse_injected_effects import usual_values
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 NAMED = (
     "backlash", "friction_hysteresis", "stick_slip", "encoder_cyclic_error", "end_stop", "finger_contact",
@@ -157,22 +157,17 @@ def opened(out: Path, seeds: range) -> None:
     )
 
 
-def main() -> None:
+@benchmark(
+    part={"choices": ("named", "open", "all"), "default": "all"},
+    out=Path("build/closed_loop"),
+    first={"type": int, "default": 1, "help": "the first seed"},
+    seeds={"type": int, "default": 1, "help": "how many"},
+)
+def main(chosen: Namespace) -> None:
     """Print the tables of the selected parts."""
-    chosen = options_of(
-        __doc__,
-        part={"choices": ("named", "open", "all"), "default": "all"},
-        out=Path("build/closed_loop"),
-        first={"type": int, "default": 1, "help": "the first seed"},
-        seeds={"type": int, "default": 1, "help": "how many"},
-    )
     seeds = range(chosen.first, chosen.first + chosen.seeds)
     if chosen.part in ("named", "all"):
         named(chosen.out, seeds)
     if chosen.part in ("open", "all"):
         opened(chosen.out, seeds)
     (chosen.out / "done.json").write_text(json.dumps({"seeds": list(seeds)}))
-
-
-if __name__ == "__main__":
-    main()

@@ -10,7 +10,6 @@ within one and two of it (both parts together), which must be 68 and 95 %; pictu
 """
 
 import io
-import time
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -24,10 +23,10 @@ from scipy.special import ndtr
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame
-from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.video_file import VideoFile
-from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
-from tests.benchmarks.options import options_of
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings
+from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.scores import Scores, percent, rms
 
 Floats = NDArray[np.float64]
 WIDTH, HEIGHT, FRAMES = 640, 480, 16
@@ -201,39 +200,30 @@ def shots(name: str, clips: int, seed: int) -> Iterator[Shot]:
         yield from clip(rng, KINDS[kind], rate, float(rng.uniform(*LEANS[lean])), is_resaved)
 
 
-def line(name: str, clips: int, seed: int) -> tuple[str, Floats]:
-    errors, stated, lost, seconds = [], [], {}, 0.0
+def scored(name: str, clips: int, seed: int) -> Scores:
+    scores = Scores()
     for shot in shots(name, clips, seed):
-        begun = time.process_time()
-        found = measure_frame(shot.frame, Settings(shot.below_px, Direction.UP, camera=LINEAR_CAMERA))
-        seconds += time.process_time() - begun
-        if isinstance(found, GapMeasurement):
-            errors.append(found.gap_px - shot.gap_px)
-            stated.append(np.hypot(found.u_gap_px, found.u_picture_px))
-        else:
-            lost[str(found.status)] = lost.get(str(found.status), 0) + 1
-    if not errors:
-        return f"{name:22s}     0 {lost}", np.empty(0)
-    e, u = np.array(errors), np.array(stated)
-    z = np.abs(e) / u
+        scores.measure(shot.frame, Settings(shot.below_px, Direction.UP, camera=LINEAR_CAMERA), shot.gap_px)
+    return scores
+
+
+def line(name: str, of: Scores) -> str:
+    if not of.found:
+        return f"{name:22s}     0 {of.refused}"
+    e, z = of.error, np.abs(of.error) / of.u
     return (
-        f"{name:22s} {e.size:5d} {np.sqrt(np.mean(e**2)):8.4f} {np.abs(e).max():8.4f} {np.median(u):8.4f} "
-        f"{100 * np.mean(z < 1):6.1f} {100 * np.mean(z < 2):6.1f} {1e3 * seconds / e.size:6.2f} {lost or ''}"
-    ), z
+        f"{name:22s} {e.size:5d} {rms(e):8.4f} {np.abs(e).max():8.4f} {np.median(of.u):8.4f} {percent(z < 1):6.1f} "
+        f"{percent(z < 2):6.1f} {1e3 * of.seconds / e.size:6.2f} {of.refused}"
+    )
 
 
-def main() -> None:
-    options = options_of(__doc__, clips=40, seed=1, only={"nargs": "*", "choices": list(CLASSES)})
+@benchmark(clips=40, seed=1, only={"nargs": "*", "choices": list(CLASSES)})
+def main(options: Namespace) -> None:
     print("class                  frames   RMS px   max px median u   <1u %  <2u %  ms")
     within = []
     for name in options.only or CLASSES:
-        words, z = line(name, options.clips, options.seed)
-        within.append(z)
-        print(words, flush=True)
+        found = scored(name, options.clips, options.seed)
+        within.append(np.abs(found.error) / found.u)
+        print(line(name, found), flush=True)
     z = np.concatenate(within)
-    one, two = (100 * np.mean(z < k) for k in (1, 2))
-    print(f"all                    {z.size:5d} within one u {one:.1f} %, within two {two:.1f} %")
-
-
-if __name__ == "__main__":
-    main()
+    print(f"all                    {z.size:5d} within one u {percent(z < 1):.1f} %, within two {percent(z < 2):.1f} %")

@@ -12,9 +12,7 @@ refused files, rows, `ok` rows, and wrong ones. With `--films N`, as many undama
 frames are called damaged, and why.
 """
 
-import argparse
 import tempfile
-import time
 from collections import defaultdict
 from dataclasses import dataclass
 from fractions import Fraction
@@ -32,7 +30,7 @@ from fingervision.frames.source import open_source
 from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark, in_turn
 
 RATE_HZ, FRAMES, SIZE_PX = 25.0, 75, (320, 240)
 GREATEST_PX, BELOW_TIP_PX = 60.0, 6.0
@@ -235,34 +233,10 @@ def wrong(found: list[Row], times_s: np.ndarray, gaps_px: np.ndarray) -> list[tu
     return bad
 
 
-def main() -> None:
-    """Print the tables."""
-    chosen = options_of(
-        __doc__,
-        files=600,
-        first={"type": int, "default": 0, "help": "number of the first file, to go on where a run ended"},
-        minutes=float("inf"),
-        seed=1,
-        only={"choices": KINDS},
-        films={"type": int, "default": 0, "help": "measure this number of undamaged films instead"},
-        verbose=False,
-        keep={"action": "store_true", "help": "keep the files with wrong rows in build/"},
-    )
-    kinds = [chosen.only] if chosen.only else list(KINDS)
-    until = time.monotonic() + 60.0 * chosen.minutes
-    with tempfile.TemporaryDirectory() as folder:
-        if chosen.films:
-            measure_sound(Path(folder), kinds, chosen.films, chosen.seed, until)
-        else:
-            measure_damaged(Path(folder), kinds, chosen, until)
-
-
-def measure_sound(folder: Path, kinds: list[str], films: int, seed: int, until: float) -> None:
+def measure_sound(folder: Path, kinds: list[str], films: int, seed: int, minutes: float) -> None:
     """Print how many frames of undamaged films are refused as damaged."""
     totals: dict[str, list[int]] = defaultdict(lambda: [0] * 4)
-    for number in range(films):
-        if time.monotonic() > until:
-            break
+    for number in in_turn(range(films), minutes):
         kind, motion = kinds[number % len(kinds)], MOTIONS[number // 2 % len(MOTIONS)]
         path = folder / kind
         coded(path, sound_film(motion, np.random.default_rng([seed, number])), *KINDS[kind])
@@ -279,7 +253,7 @@ def measure_sound(folder: Path, kinds: list[str], films: int, seed: int, until: 
         print(f"{motion:10} {count:6} {frames:7} {measured:7} {bad_frames:15}")
 
 
-def measure_damaged(folder: Path, kinds: list[str], chosen: argparse.Namespace, until: float) -> None:
+def measure_damaged(folder: Path, kinds: list[str], chosen: Namespace) -> None:
     """Print what damaged files give."""
     totals: dict[str, list[int]] = defaultdict(lambda: [0] * 6)
     frames, originals, ran = film(GAPS_PX), {}, 0
@@ -292,9 +266,7 @@ def measure_damaged(folder: Path, kinds: list[str], chosen: argparse.Namespace, 
             np.array([row.time_s for row in whole], dtype=float),
             np.array([row.gap_px for row in whole], dtype=float),
         )
-    for number in range(chosen.first, chosen.files):
-        if time.monotonic() > until:
-            break
+    for number in in_turn(range(chosen.first, chosen.files), chosen.minutes):
         kind = kinds[number % len(kinds)]
         content, times_s, gaps_px = originals[kind]
         changed, words, what = damaged(folder / kind, content, kind, np.random.default_rng([chosen.seed, number]))
@@ -323,5 +295,21 @@ def measure_damaged(folder: Path, kinds: list[str], chosen: argparse.Namespace, 
         print(f"{name:12} {total[0]:6} {total[1]:8} {total[2]:7} {total[3]:7} {total[4]:6} {total[5]:17}")
 
 
-if __name__ == "__main__":
-    main()
+@benchmark(
+    files=600,
+    first={"type": int, "default": 0, "help": "number of the first file, to go on where a run ended"},
+    minutes=float("inf"),
+    seed=1,
+    only={"choices": KINDS},
+    films={"type": int, "default": 0, "help": "measure this number of undamaged films instead"},
+    verbose=False,
+    keep={"action": "store_true", "help": "keep the files with wrong rows in build/"},
+)
+def main(chosen: Namespace) -> None:
+    """Print the tables."""
+    kinds = [chosen.only] if chosen.only else list(KINDS)
+    with tempfile.TemporaryDirectory() as folder:
+        if chosen.films:
+            measure_sound(Path(folder), kinds, chosen.films, chosen.seed, chosen.minutes)
+        else:
+            measure_damaged(Path(folder), kinds, chosen)

@@ -7,7 +7,7 @@ pictures' measurement has there; pictures themselves are left out, they cost ten
 `fingervision demo --hide A --hide B` does the same with pictures.
 """
 
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections import Counter
 from dataclasses import replace
 from itertools import pairwise
 
@@ -21,7 +21,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.effects import catalogue
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, answers, benchmark
 
 EDGE_MM = 0.00014
 """Random noise of one edge in the demonstration's pictures (`u_random_mm` of the gap over the square root of 2)."""
@@ -95,25 +95,17 @@ def one(seed: int) -> tuple[str, bool, bool, str]:
     return str(report.verdict), inside, stands, line
 
 
-def main() -> None:
+@benchmark(draws=300, seed=41, jobs=2, first={"type": int, "default": 0, "help": "number of the first draw"})
+def main(arguments: Namespace) -> None:
     """Draw, diagnose, count."""
-    arguments = options_of(
-        __doc__, draws=300, seed=41, jobs=2, first={"type": int, "default": 0, "help": "number of the first draw"}
-    )
     seeds = [1000 * arguments.seed + k for k in range(arguments.first, arguments.first + arguments.draws)]
     results = []
-    with ProcessPoolExecutor(arguments.jobs) as pool:
-        for future in as_completed([pool.submit(one, seed) for seed in seeds]):
-            results.append(future.result())
-            _, inside, stands, line = results[-1]
-            print("STANDS" if stands else "      ", "in " if inside else "out", line, flush=True)
-    verdicts = [verdict for verdict, _, _, _ in results]
-    print({verdict: verdicts.count(verdict) for verdict in sorted(set(verdicts))})
+    for _, result in answers(one, seeds, arguments.jobs):
+        results.append(result)
+        _, inside, stands, line = result
+        print("STANDS" if stands else "      ", "in " if inside else "out", line, flush=True)
+    print(dict(sorted(Counter(verdict for verdict, _, _, _ in results).items())))
     print(
         f"what was hidden is the answer or in its set: {sum(inside for _, inside, _, _ in results)} of {len(results)}"
     )
     print(f"names that leave too much standing: {sum(stands for _, _, stands, _ in results)} of {len(results)}")
-
-
-if __name__ == "__main__":
-    main()

@@ -17,7 +17,7 @@ import numpy as np
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 BARS_S = {100: 2.0, 2000: 5.0, 20000: 60.0}
 RATE_HZ = 20.0
@@ -66,9 +66,9 @@ def write(folder: Path, samples: int, hidden: str, seed: int) -> None:
     (folder / "sim.csv").write_text("input_mm,gap_mm\n" + "\n".join(lines) + "\n", encoding="utf-8")
 
 
-def main() -> None:
+@benchmark(samples="100,2000,20000", hidden={"default": ",".join(HIDDEN)})
+def main(chosen: Namespace) -> None:
     """Read the options, measure the durations, and print the table."""
-    chosen = options_of(__doc__, samples="100,2000,20000", hidden={"default": ",".join(HIDDEN)})
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; the first line compiles where nothing is cached")
     print("samples  hidden    wall s  processor s  bar s  verdict")
     for samples in map(int, chosen.samples.split(",")):
@@ -88,7 +88,3 @@ def main() -> None:
                 flush=True,
             )
     print(f"load {os.getloadavg()[0]:.1f} at the end")
-
-
-if __name__ == "__main__":
-    main()

@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 TOP = Path(__file__).resolve().parents[2]
 SAMPLE = TOP / "sample_frames" / "opening" / "opening.mp4"
@@ -67,8 +67,8 @@ def row(words: str, figures: list[tuple[float, float]], budget_s: float) -> None
     print(f"{words:58}{wall:9.2f}{processor:11.2f}{budget_s:9.2f}", flush=True)
 
 
-def main() -> None:
-    runs = options_of(__doc__, runs=3).runs
+@benchmark(runs=3)
+def main(chosen: Namespace) -> None:
     measure = ["-m", "fingervision", "measure", str(SAMPLE), "--px-per-mm", "34", "--out"]
     live = ["-m", "fingervision", "live", "simulated", "--json", "--port", "0", "--out"]
     with tempfile.TemporaryDirectory() as name:
@@ -77,7 +77,7 @@ def main() -> None:
         print(f"load of the machine {load:.1f}, {os.cpu_count()} processors\n")
         print(f"{'':58}{'clock s':>9}{'processor':>11}{'budget':>9}")
         new, built = [], []
-        for k in range(runs):
+        for k in range(chosen.runs):
             folder = copy(top / str(k))
             new.append(timed([*measure, str(top / f"new{k}")], folder))
             for cache in folder.rglob("__pycache__"):
@@ -85,22 +85,20 @@ def main() -> None:
             built.append(timed([*measure, str(top / f"built{k}")], folder))
         row("first measurement of 300 frames, source tree, compiles", new, BUDGET_S["measure"])
         row("first measurement of 300 frames, installed", built, BUDGET_S["measure"])
-        again = [timed([*measure, str(top / f"again{k}")], folder) for k in range(runs)]
+        again = [timed([*measure, str(top / f"again{k}")], folder) for k in range(chosen.runs)]
         row("the same again", again, BUDGET_S["measure"])
-        first = [timed([*live, str(top / f"live{k}")], folder, lambda line: '"gap_px"' in line) for k in range(runs)]
+        first = [
+            timed([*live, str(top / f"live{k}")], folder, lambda line: '"gap_px"' in line) for k in range(chosen.runs)
+        ]
         row("live: the first measured frame", first, BUDGET_S["live"])
         row(
             "import fingervision",
-            [timed(["-c", "import fingervision"], folder) for _ in range(runs)],
+            [timed(["-c", "import fingervision"], folder) for _ in range(chosen.runs)],
             BUDGET_S["import"],
         )
-        row("nothing: Python alone", [timed(["-c", "pass"], folder) for _ in range(runs)], BUDGET_S["import"])
+        row("nothing: Python alone", [timed(["-c", "pass"], folder) for _ in range(chosen.runs)], BUDGET_S["import"])
         row(
             "fingervision --help",
-            [timed(["-m", "fingervision", "--help"], folder) for _ in range(runs)],
+            [timed(["-m", "fingervision", "--help"], folder) for _ in range(chosen.runs)],
             BUDGET_S["help"],
         )
-
-
-if __name__ == "__main__":
-    main()

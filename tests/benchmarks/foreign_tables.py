@@ -23,7 +23,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.tables.questions import OpenQuestionError, Reading
 from fingervision.tables.read import read_drive, read_measured_table
 from tests.benchmarks.foreign.drawn import CLASSES, Drawn, Values, drawn
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 ROUNDS = 6
 OUTCOMES = ("right", "wrong", "right after advice", "wrong after advice", "dead end")
@@ -123,15 +123,14 @@ def _fits(reading: Reading, table: Drawn) -> bool:
     )
 
 
-def main() -> None:
+@benchmark(
+    each=40,
+    seed=1,
+    only={"choices": list(CLASSES)},
+    show={"action": "store_true", "help": "print what was said for each table not simply right"},
+)
+def main(given: Namespace) -> None:
     """Draw, obey, compare, print."""
-    given = options_of(
-        __doc__,
-        each=40,
-        seed=1,
-        only={"choices": list(CLASSES)},
-        show={"action": "store_true", "help": "print what was said for each table not simply right"},
-    )
     counts: dict[str, Counter[str]] = {label: Counter() for label in CLASSES}
     with tempfile.TemporaryDirectory() as top:
         for number, (label, table) in enumerate(drawn(given.seed, given.each)):
@@ -151,7 +150,3 @@ def main() -> None:
     print(f"{'all':20}" + "".join(f"{total[name]:20}" for name in OUTCOMES))
     bad = total["wrong"] + total["wrong after advice"]
     raise SystemExit(bad > 0 or 10 * total["dead end"] > sum(total.values()))
-
-
-if __name__ == "__main__":
-    main()

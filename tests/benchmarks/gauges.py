@@ -31,7 +31,7 @@ from fingervision.gauges.picture import picture_of
 from fingervision.gauges.reading import Reading
 from fingervision.vision.pipeline import Settings
 from tests.benchmarks.drawn_surfaces import SURFACES
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.gauges.drawn import Texture, bar, checker, cross, disc, drawn, half_plane, seen
 from tests.gauges.followed import followed, gauges_of, share_within
 
@@ -276,14 +276,8 @@ def silence(each: int, folder: Path, seed: int = 1) -> None:
 PARTS = {f.__name__: f for f in (patches, photographs, drawings, lines, circles, markers, cost, silence)}
 
 
-def main() -> None:
-    arguments = options_of(
-        __doc__, each=40, seed=1, only={"nargs": "+", "choices": sorted(PARTS), "default": list(PARTS)}
-    )
+@benchmark(each=40, seed=1, only={"nargs": "+", "choices": sorted(PARTS), "default": list(PARTS)})
+def main(arguments: Namespace) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for name in arguments.only:
             PARTS[name](arguments.each, Path(folder), arguments.seed)
-
-
-if __name__ == "__main__":
-    main()

@@ -15,7 +15,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 TOP = Path(__file__).parents[2]
 LIVE = "fingervision/live"
@@ -260,9 +260,9 @@ def pytest_passes(top: Path, tests: list[str]) -> bool:
     return done.returncode == 0
 
 
-def main() -> None:
+@benchmark(only={"default": "", "help": "part of a guard's name"}, browser=False)
+def main(chosen: Namespace) -> None:
     """Print the table."""
-    chosen = options_of(__doc__, only={"default": "", "help": "part of a guard's name"}, browser=False)
     guards = [each for each in GUARDS + IN_A_BROWSER * chosen.browser if chosen.only in each.name]
     unseen = 0
     with tempfile.TemporaryDirectory() as name:
@@ -284,7 +284,3 @@ def main() -> None:
             print(f"{each.name:50} {each.test}: {each.words:32} {'fails' if is_seen else 'PASSES'}", flush=True)
     print(f"{len(guards)} guards, {unseen} that no test misses")
     sys.exit(bool(unseen))
-
-
-if __name__ == "__main__":
-    main()

@@ -11,7 +11,6 @@ input's gauge up anew as well; `--other-specimen` draws every thickness within 1
 """
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -34,7 +33,7 @@ from fingervision.models.planar_region import PlanarRegion
 from fingervision.rendering import Camera, Patch, Scene, render
 from fingervision.rendering.polygon import polygon
 from fingervision.storage.mechanism_toml import read_mechanism
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 Array = NDArray[np.float64]
 DRAWINGS = Path(__file__).parent / "mechanisms"
@@ -289,18 +288,16 @@ def words_of(found: WhatChanged) -> str:
     )
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+@benchmark(
+    frames=36,
+    seed=1,
+    nulls={"type": int, "default": 3, "help": "recordings of each mechanism with nothing hidden"},
+    only={"default": ",".join(CASES)},
+    gain={"type": float, "default": 0.0, "help": "error of the input's gain on the second day"},
+    other_specimen={"action": "store_true", "help": "another specimen on the second day"},
+)
+def main(chosen: Namespace) -> None:
     """Read the options, record, compare, and print the bars."""
-    chosen = options_of(
-        __doc__,
-        arguments,
-        frames=36,
-        seed=1,
-        nulls={"type": int, "default": 3, "help": "recordings of each mechanism with nothing hidden"},
-        only={"default": ",".join(CASES)},
-        gain={"type": float, "default": 0.0, "help": "error of the input's gain on the second day"},
-        other_specimen={"action": "store_true", "help": "another specimen on the second day"},
-    )
     tally = dict.fromkeys(("still frames and motion", "motion alone", "still frames alone"), 0)
     faults = nulls = claims = false = 0
     for number, name in enumerate(chosen.only.split(",")):
@@ -332,7 +329,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for way, right in tally.items():
         print(f"right place, or in a set of at most four, by {way}: {right} of {faults}")
     print(f"claims with nothing hidden: {claims} of {3 * nulls}; false places: {false}")
-
-
-if __name__ == "__main__":
-    main()

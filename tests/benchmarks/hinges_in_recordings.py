@@ -34,7 +34,7 @@ from fingervision.measuring.drawing_placement import GivenPoint
 from fingervision.models.mechanism_bodies import bodies_of, plate_poses
 from fingervision.models.place_answers import PlaceAnswers
 from tests.benchmarks.drawn_hinges import Hidden, frames_of, hidden, view_of
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.which_hinge import BODIES, Array, drawn
 
 PARTS = ("x_mm", "y_mm", "angle_mrad")
@@ -91,20 +91,18 @@ def verdict_of(what: Hidden, found: PlaceFindings, scale_off: float) -> tuple[st
     return (("named" if len(told) == 1 else "in the set") if right else "wrong place"), told, offs
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+@benchmark(
+    recordings=20,
+    frames=40,
+    px_per_mm=6.0,
+    seed=1,
+    bodies={"nargs": "+", "choices": BODIES, "default": list(BODIES)},
+    hidden={"choices": ("one", "two"), "default": "one"},
+    view={"nargs": "+", "choices": VIEWS, "default": ["plain"]},
+    points={"type": int, "choices": (2, 3), "default": 3},
+)
+def main(given: Namespace) -> None:
     """Render, follow, diagnose, print."""
-    given = options_of(
-        __doc__,
-        arguments,
-        recordings=20,
-        frames=40,
-        px_per_mm=6.0,
-        seed=1,
-        bodies={"nargs": "+", "choices": BODIES, "default": list(BODIES)},
-        hidden={"choices": ("one", "two"), "default": "one"},
-        view={"nargs": "+", "choices": VIEWS, "default": ["plain"]},
-        points={"type": int, "choices": (2, 3), "default": 3},
-    )
     answers = PlaceAnswers(drawn())
     names = tuple(f"{body}.{part}" for body in given.bodies for part in PARTS)
     counts: dict[str, Counter[str]] = {}
@@ -160,7 +158,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"sizes within 1.96 u: {np.sum(np.abs(z) < 1.96)} of {z.size}, RMS of error / u "
             f"{np.sqrt(np.mean(z**2)):.2f}"
         )
-
-
-if __name__ == "__main__":
-    main()

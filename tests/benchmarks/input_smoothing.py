@@ -12,19 +12,19 @@ import numpy as np
 
 from fingervision.motion.encoder import input_sigma
 from fingervision.motion.local_polynomial_smoothing import blended, smoothed
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.hidden.design import Kind, draw_design
 from tests.benchmarks.hidden.gripper_table import draw_table
 from tests.benchmarks.hidden.noise import draw_noise, rounded
-from tests.benchmarks.options import options_of
 
 KINDS: tuple[Kind, ...] = ("rich", "ordinary", "poor")
 SINE = 2
 """Number of the first sinusoidal run in a rich design; every fourth run after it is sinusoidal too."""
 
 
-def main() -> None:
+@benchmark(records=200, seed=2)
+def main(asked: Namespace) -> None:
     """Simulate records, smooth the records, and print the table."""
-    asked = options_of(__doc__, records=200, seed=2)
     rng = np.random.default_rng(asked.seed)
     left: dict[tuple[str, str, str], list[tuple[float, float]]] = defaultdict(list)
     drawn = 0
@@ -57,7 +57,3 @@ def main() -> None:
     for row, values in sorted(left.items()):
         mean = np.mean(values, axis=0)
         print(f"{row[0]:<9} {row[1]:<7} {row[2]:<8} {mean[0]:5.2f} {mean[1]:8.2f} {len(values):8d}")
-
-
-if __name__ == "__main__":
-    main()

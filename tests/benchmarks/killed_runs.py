@@ -21,7 +21,7 @@ import numpy as np
 from fingervision.storage.recipe_toml import write_recipe
 from fingervision.storage.recorded_video import frames_in
 from fingervision.storage.samples_csv import read_samples
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 STEPS: tuple[dict[str, object], ...] = (
     {"kind": "triangle", "from_mm": -0.2, "to_mm": 0.4, "speed_mm_s": 0.4},
@@ -39,9 +39,9 @@ def command(recipe: Path, out: Path, *more: str) -> list[str]:
     return [sys.executable, "-m", "fingervision", "bed", "run", str(recipe), "--out", str(out), *more]
 
 
-def main() -> None:
+@benchmark(moments=50, seed=1, out=Path("build/killed_runs"))
+def main(chosen: Namespace) -> None:
     """Print the table."""
-    chosen = options_of(__doc__, moments=50, seed=1, out=Path("build/killed_runs"))
     shutil.rmtree(chosen.out, ignore_errors=True)
     chosen.out.mkdir(parents=True)
     recipe = chosen.out / "recipe.toml"
@@ -72,7 +72,3 @@ def main() -> None:
     print(f"killed at {chosen.moments} moments of {seconds:.1f} s")
     print(f"{valid} folders valid, at most {max(lost_s):.2f} s lost")
     print(f"{same} of {chosen.moments} resumed runs ended with the table of a run that was never killed")
-
-
-if __name__ == "__main__":
-    main()

@@ -43,7 +43,7 @@ from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.gaps_csv import GapRow
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark, told
 
 ASLEEP_AFTER_S, BEGINS_WITHIN_S = 5.0, 30.0
 CYCLE, PX_PER_MM = 50, 34.0
@@ -64,40 +64,6 @@ with connect(f"ws://{at.netloc}/socket?{at.query}", origin=f"http://{at.netloc}"
         if isinstance(message, bytes):
             page.send('{"do": "ack"}')
 """
-
-
-def main() -> None:
-    """Run once and print the table."""
-    wanted = options_of(
-        __doc__,
-        seconds=600.0,
-        size="640x480",
-        rate_hz=25,
-        record=False,
-        page=False,
-        viewers=0,
-        rtsp=False,
-        busy=0,
-        colour=False,
-        json=False,
-    )
-    width_px, height_px = (int(part) for part in wanted.size.split("x"))
-    with tempfile.TemporaryDirectory() as folder:
-        pictures = Path(folder) / "camera.mjpeg"
-        draw(pictures, width_px, height_px, in_colour=wanted.colour)
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
-        address = f"rtsp://127.0.0.1:{port}/camera" if wanted.rtsp else f"http://127.0.0.1:{port}/feed.mjpg"
-        serving = rtsp(pictures, port) if wanted.rtsp else mjpeg(pictures, wanted.rate_hz, address)
-        others = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(wanted.busy)]
-        camera = subprocess.Popen(serving, stderr=subprocess.DEVNULL)
-        try:
-            run(address, Path(folder), wanted)
-        finally:
-            for each in (camera, *others):
-                each.kill()
-                each.wait()
 
 
 def answering(address: str) -> Capture:
@@ -185,11 +151,6 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     told("load of the machine at the end", f"{load:.1f}")
 
 
-def told(what: str, figure: str, bar: str = "", met: bool | None = None) -> None:
-    """Print a line of the table: what, how much, the bar, and whether it is met."""
-    print(f"{what:38} {figure:>20}  {bar:18} {'' if met is None else 'met' if met else 'MISSED'}", flush=True)
-
-
 def looked_at(session: Session, viewers: int) -> "list[subprocess.Popen[bytes]]":
     """Serve the page, and look at it from processes of their own; with viewers one of them goes to sleep."""
     page = Page(session, bound("127.0.0.1", 0))
@@ -222,5 +183,34 @@ def resident_bytes() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
 
-if __name__ == "__main__":
-    main()
+@benchmark(
+    seconds=600.0,
+    size="640x480",
+    rate_hz=25,
+    record=False,
+    page=False,
+    viewers=0,
+    rtsp=False,
+    busy=0,
+    colour=False,
+    json=False,
+)
+def main(wanted: Namespace) -> None:
+    """Run once and print the table."""
+    width_px, height_px = (int(part) for part in wanted.size.split("x"))
+    with tempfile.TemporaryDirectory() as folder:
+        pictures = Path(folder) / "camera.mjpeg"
+        draw(pictures, width_px, height_px, in_colour=wanted.colour)
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        address = f"rtsp://127.0.0.1:{port}/camera" if wanted.rtsp else f"http://127.0.0.1:{port}/feed.mjpg"
+        serving = rtsp(pictures, port) if wanted.rtsp else mjpeg(pictures, wanted.rate_hz, address)
+        others = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(wanted.busy)]
+        camera = subprocess.Popen(serving, stderr=subprocess.DEVNULL)
+        try:
+            run(address, Path(folder), wanted)
+        finally:
+            for each in (camera, *others):
+                each.kill()
+                each.wait()

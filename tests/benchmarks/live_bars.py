@@ -20,7 +20,7 @@ import subprocess
 import sys
 from typing import Any
 
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark, told
 
 MOST_ALONE, MOST_ADDED, MOST_GROWN_MB = 0.15, 0.03, 10.0
 
@@ -35,14 +35,10 @@ def part(*options: str) -> dict[str, Any]:
     return figures
 
 
-def told(what: str, figure: str, bar: str, *, met: bool) -> None:
-    """Print a line of the table."""
-    print(f"{what:58} {figure:>22}  {bar:20} {'met' if met else 'MISSED'}", flush=True)
-
-
-def main() -> None:
+@benchmark(minutes=10.0)
+def main(chosen: Namespace) -> None:
     """Print the table."""
-    long_s = 60.0 * options_of(__doc__, minutes=10.0).minutes
+    long_s = 60.0 * chosen.minutes
     long, short = f"--seconds={long_s}", f"--seconds={max(20.0, long_s / 5.0)}"
     print(f"load of the machine before: {os.getloadavg()[0]:.1f}")
     alone = part(short)
@@ -71,7 +67,3 @@ def main() -> None:
             met=busy["core"] <= MOST_ALONE,
         )
     print(f"load of the machine after: {os.getloadavg()[0]:.1f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -18,7 +18,7 @@ from fingervision.frames.source import open_source
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.live.test_damaged_stream import COUNT, SCALE, SIZE_PX, coded, recorded
 
 TASK = Task(BareScale(SCALE))
@@ -36,9 +36,9 @@ def wrong_rows(live: list[dict[str, str]], times_s: NDArray[np.float64], gaps_px
     return sum(abs(gap - np.interp(time, times_s, gaps_px)) > 3.0 * u + 0.1 for time, gap, u in numbers)
 
 
-def main() -> None:
+@benchmark(runs=50, seed=1)
+def main(chosen: Namespace) -> None:
     """Print the counts."""
-    chosen = options_of(__doc__, runs=50, seed=1)
     rng = np.random.default_rng(chosen.seed)
     camera = Camera(noise_grey=1.0)
     film = [
@@ -76,7 +76,3 @@ def main() -> None:
             times_s, gaps_px = (np.array([float(row[key]) for row in whole]) for key in ("time_s", "gap_px"))
             wrong += min(wrong_rows(live, times_s - first_s, gaps_px) for first_s in times_s[:5])
     print(f"{agree} of {chosen.runs} runs agree; {rows} rows live, {damaged} damaged, {wrong} ok and wrong")
-
-
-if __name__ == "__main__":
-    main()

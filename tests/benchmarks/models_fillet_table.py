@@ -13,6 +13,7 @@ from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import box
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import triangulate
+from tests.benchmarks.frame import Namespace, benchmark
 
 UNIT = Material("unit", 1.0, 0.3, 1.0, 1.0)
 STRAIGHT = 2.0
@@ -49,13 +50,10 @@ def factors(radius: float, depth: float, straight: float = STRAIGHT) -> tuple[fl
     return found[0], found[1]
 
 
-def main() -> None:
+@benchmark()
+def main(_: Namespace) -> None:
     """Print one row per radius: factors in tension and bending for each ratio of depth to radius."""
     print(f"r / t | tension, bending at depth / r of {DEPTHS}")
     for radius in RADII:
         cells = [factors(radius, depth * radius) for depth in DEPTHS]
         print(f"{radius:6g} | " + ", ".join(f"({a:.4f}, {b:.4f})" for a, b in cells), flush=True)
-
-
-if __name__ == "__main__":
-    main()

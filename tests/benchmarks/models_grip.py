@@ -8,6 +8,7 @@ from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.grip import Part, first_grip_mm, gripped
 from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.models_held_out import HELD_OUT, drawn
 
 ROOT = Path(__file__).parents[2]
@@ -26,7 +27,8 @@ def cases(sample: Gripper) -> list[tuple[str, Gripper]]:
     ]
 
 
-def main() -> None:
+@benchmark()
+def main(_: Namespace) -> None:
     """Print one line per drawing, with differences in %."""
     print("drawing | grip | first mode, drive held | stated: grip, mode")
     for name, gripper in cases(read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")):
@@ -43,7 +45,3 @@ def main() -> None:
             f"{100.0 * stated.mode_error:.0f}",
             flush=True,
         )
-
-
-if __name__ == "__main__":
-    main()

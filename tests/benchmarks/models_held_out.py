@@ -14,7 +14,7 @@ from fingervision.models.lumped import LumpedGripper
 from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.gripper_toml import read_gripper
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 ROOT = Path(__file__).parents[2]
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
@@ -69,15 +69,14 @@ def drawn_at_random(count: int, seed: int) -> list[tuple[Material, float, float,
     return found
 
 
-def main() -> None:
+@benchmark(
+    seed={"type": int, "help": "draw others at random; the fixed ones without"},
+    count={"type": int, "default": 6, "help": "how many with --seed"},
+)
+def main(asked: Namespace) -> None:
     """Print errors in % against the plane model with a mesh twice as fine; its force and modes include the width
     effect.
     """
-    asked = options_of(
-        __doc__,
-        seed={"type": int, "help": "draw others at random; the fixed ones without"},
-        count={"type": int, "default": 6, "help": "how many with --seed"},
-    )
     rows = HELD_OUT if asked.seed is None else tuple(drawn_at_random(asked.count, asked.seed))
     sample = read_gripper(ROOT / "sample_frames" / "paper" / "gripper.toml")
     print(
@@ -112,7 +111,3 @@ def main() -> None:
             f"{time.perf_counter() - began:.0f} s",
             flush=True,
         )
-
-
-if __name__ == "__main__":
-    main()

@@ -4,13 +4,15 @@ import numpy as np
 
 from fingervision.domain.gripper import Material
 from fingervision.models.notch import bar_compliance, beam_compliance, circular_notch
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 
 MATERIAL = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
 PLANAR = [0, 1, 5]
 
 
-def main() -> None:
+@benchmark()
+def main(_: Namespace) -> None:
     """Print for each t / R the ratios in plane stress and with elastic blocks, then six ratios for each b / t."""
     for t_over_r in (0.0125, 0.025, 0.05, 0.1, 0.25, 0.5, 0.8, 1.6):
         notch, height = circular_notch(1.0, t_over_r, 1.0), 2.0 + t_over_r
@@ -25,7 +27,3 @@ def main() -> None:
             solid = np.diag(solid_compliance(notch, MATERIAL, 36, 3, 6))
             factors = solid / np.diag(beam_compliance(notch, MATERIAL))
             print(f"{t_over_r:6.4f} {b_over_t:5.1f} |", ", ".join(f"{factor:.5f}" for factor in factors), flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,5 @@
 """Print the computing times of the gripper's models."""
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -19,12 +18,30 @@ from fingervision.models.parameter_sweep import parse_variation, sweep_answers
 from fingervision.models.physics import Physics
 from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.storage.gripper_toml import read_gripper
+from tests.benchmarks.frame import Namespace, benchmark, processor_s
 
 GRIPPER = Path(__file__).parents[2] / "sample_frames" / "paper" / "gripper.toml"
 REPEATS = 3
 
 
-def main() -> None:
+def _command() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        run = [sys.executable, "-m", "fingervision", "model", str(GRIPPER), "--kind", "all", "--out", folder]
+        subprocess.run(run, check=True, capture_output=True)
+
+
+def _row(what: str, run: Callable[[], object]) -> None:
+    seconds = []
+    for _ in range(REPEATS):
+        began = time.perf_counter(), processor_s()
+        run()
+        seconds.append((time.perf_counter() - began[0], processor_s() - began[1]))
+    clock, processor = np.median(seconds, axis=0)
+    print(f"{clock:8.3f} s  {processor:8.3f} s  {what}", flush=True)
+
+
+@benchmark()
+def main(_: Namespace) -> None:
     """Print the median of three runs of each task: wall time and processor time in seconds."""
     gripper = read_gripper(GRIPPER)
     time_s = np.arange(0.0, 60.0, 0.04)
@@ -54,29 +71,3 @@ def main() -> None:
     variations = [parse_variation("hinge.thickness_mm=0.6:1.4:20"), parse_variation("lever.l2_mm=16:20:10")]
     _row("200 lumped variants (at most 5 s)", lambda: sweep_answers(gripper, variations, HingeTheory.CORRECTED))
     _row("model --kind all, the command (at most 4 s)", _command)
-
-
-def _command() -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        run = [sys.executable, "-m", "fingervision", "model", str(GRIPPER), "--kind", "all", "--out", folder]
-        subprocess.run(run, check=True, capture_output=True)
-
-
-def _processor_s() -> float:
-    """Processor time (s) of this process and of its finished child processes."""
-    used = os.times()
-    return used.user + used.system + used.children_user + used.children_system
-
-
-def _row(what: str, run: Callable[[], object]) -> None:
-    seconds = []
-    for _ in range(REPEATS):
-        began = time.perf_counter(), _processor_s()
-        run()
-        seconds.append((time.perf_counter() - began[0], _processor_s() - began[1]))
-    clock, processor = np.median(seconds, axis=0)
-    print(f"{clock:8.3f} s  {processor:8.3f} s  {what}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

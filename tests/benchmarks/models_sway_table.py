@@ -8,6 +8,7 @@ from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.hinge_correction import SWAY_SHEAR
 from fingervision.models.lumped import MechanismFrame
 from fingervision.storage.mechanism_toml import mechanism_from_tables
+from tests.benchmarks.frame import Namespace, benchmark
 
 RADIUS_MM = 10.0
 DRAWING = """name = "notch between blocks"
@@ -53,7 +54,8 @@ def stiffnesses(
     return plate.stiffness_n_mm, frame.stiffness_n_mm
 
 
-def main() -> None:
+@benchmark()
+def main(_: Namespace) -> None:
     """Print for every t / R the ratio required, and the error of the force with the present ratio in per cent."""
     from fingervision.models.hinge_correction import _sway_ratio
 
@@ -65,7 +67,3 @@ def main() -> None:
         plate, frame = stiffnesses(t, (0, 1))
         ratio = _sway_ratio(t_over_r) + (1.0 / plate - 1.0 / frame) / (SWAY_SHEAR * along)
         print(f"t / R {t_over_r:6.4f}: ratio {ratio:.4f}; force {100.0 * (frame / plate - 1.0):+.2f} %", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -18,8 +18,8 @@ from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.models.triangulate import triangulate
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import read_drawing
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.models_held_out import ABS, ALUMINIUM, SILICON, STEEL, TITANIUM, drawn
-from tests.benchmarks.options import options_of
 from tests.benchmarks.solid_reference import solid_answer
 
 ROOT = Path(__file__).parents[2]
@@ -93,13 +93,16 @@ def cases() -> list[tuple[str, Mechanism, Gripper | None]]:
     return found
 
 
-def main() -> None:
+def _percent(ours: float, solid: float | None) -> str:
+    return f"{100.0 * (ours / solid - 1.0):+7.3f}" if solid else "      -"
+
+
+@benchmark(
+    only={"type": int, "nargs": "*", "help": "places of drawings in the list; all without"},
+    layers={"type": int, "default": 4, "help": "wedges through the plate"},
+)
+def main(asked: Namespace) -> None:
     """Print one line per drawing: errors (%) of the plane models compared with the three-dimensional model."""
-    asked = options_of(
-        __doc__,
-        only={"type": int, "nargs": "*", "help": "places of drawings in the list; all without"},
-        layers={"type": int, "default": 4, "help": "wedges through the plate"},
-    )
     if shutil.which("ccx") is None:
         sys.exit("CalculiX (ccx, Debian package calculix-ccx) must be installed, but is not.")
     print("drawing | largest motion of a probe: finite_element, lumped | force: same | mode in the plane, drive held: "
@@ -131,11 +134,3 @@ def main() -> None:
             across.append(_percent(StiffnessMatrixGripper(gripper).out_of_plane_modes_hz()[0], lifted))
         print(f"{place:2d} {title:44s} | {' | '.join(' '.join(part) for part in (*cells, across))} | {seconds:.0f} s",
               flush=True)  # fmt: skip
-
-
-def _percent(ours: float, solid: float | None) -> str:
-    return f"{100.0 * (ours / solid - 1.0):+7.3f}" if solid else "      -"
-
-
-if __name__ == "__main__":
-    main()

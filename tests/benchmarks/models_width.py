@@ -6,6 +6,7 @@ from dataclasses import replace
 from fingervision.domain.gripper import Material
 from fingervision.models.hinge_correction import plane_strain_share
 from fingervision.models.notch import circular_notch
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 
 PA2200 = Material("PA2200", 1650.0, 0.34, 930.0, 48.0)
@@ -14,7 +15,8 @@ NARROW = 0.25
 """Width over thickness at which brick elements are in plane stress; the error of their mesh cancels in the ratio."""
 
 
-def main() -> None:
+@benchmark()
+def main(_: Namespace) -> None:
     """Print one line for each t / R, width over thickness, and Poisson's ratio."""
     print(
         "t/R  b/t  nu | bending, bricks over narrow bricks | plane model over plane stress | difference | plane stress"
@@ -40,7 +42,3 @@ def main() -> None:
                     f"({time.perf_counter() - began:.1f} s)",
                     flush=True,
                 )
-
-
-if __name__ == "__main__":
-    main()

@@ -25,7 +25,7 @@ from fingervision.storage.model_toml import read_model
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.steps_toml import read_steps
 from fingervision.storage.toml_section import Section
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 MODEL = """schema = 1
 base = "simulation.csv"
@@ -131,9 +131,9 @@ def is_sound(value: object, depth: int = 0) -> bool:
     return True
 
 
-def main() -> None:
+@benchmark(files=2000, seed=1)
+def main(chosen: Namespace) -> None:
     """Print the table."""
-    chosen = options_of(__doc__, files=2000, seed=1)
     rng = np.random.default_rng(chosen.seed)
     top = Path(__file__).parents[2]
     with tempfile.TemporaryDirectory() as name:
@@ -174,7 +174,3 @@ def main() -> None:
             )
             for words, times in seen.most_common(8):
                 print(f"    {times} x {words}")
-
-
-if __name__ == "__main__":
-    main()

@@ -4,7 +4,6 @@ Run as `python -m tests.benchmarks.own_physics [--no-force]`. Each line shows on
 and the disagreement before and after the correction.
 """
 
-import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,6 +23,7 @@ from fingervision.models.stiffness_matrix import ComplianceChain
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
+from tests.benchmarks.frame import Namespace, benchmark
 
 Array = NDArray[np.float64]
 Answer = tuple[Array, Array, Array]
@@ -190,11 +190,12 @@ def answered(hidden: Hidden, folder: Path, *, force: bool, drawing: Path = DRAWI
     return diagnose(measured, read_model(drawing), seed=SEED).report
 
 
-def main(*, force: bool) -> None:
+@benchmark(no_force=False)
+def main(chosen: Namespace) -> None:
     """Print the table of results."""
     for name, hidden in CASES.items():
         with tempfile.TemporaryDirectory() as folder:
-            report = answered(hidden, Path(folder), force=force)
+            report = answered(hidden, Path(folder), force=not chosen.no_force)
         d = report.disagreement
         found = " | ".join("+".join(names) for names in report.alternatives) or "-"
         print(f"{name:15} {report.verdict:10} {found:50} {1e3 * d.before_rms_mm:8.1f} -> {1e3 * d.after_rms_mm:.2f} um"
@@ -202,7 +203,3 @@ def main(*, force: bool) -> None:
         for effect in report.effects:
             numbers = (f"{key} = {e.value:.5g} +- {e.u or 0.0:.2g}" for key, e in effect.parameters.items())
             print(f"{'':16}{effect.name}: {', '.join(numbers)}")
-
-
-if __name__ == "__main__":
-    main(force="--no-force" not in sys.argv)

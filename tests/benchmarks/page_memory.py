@@ -16,7 +16,7 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.live.browser import CHROMIUM, QUIET
 
 START_S, EVERY_S = 120.0, 60.0
@@ -30,9 +30,9 @@ def resident_mb(process: int) -> float:
     return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) * 1024 / MEGABYTE
 
 
-def main() -> None:
+@benchmark(minutes=15.0)
+def main(chosen: Namespace) -> None:
     """Print the table."""
-    chosen = options_of(__doc__, minutes=15.0)
     with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
         log = Path(name) / "log"
         command = [sys.executable, "-m", "fingervision", "live", "simulated", "--port", "0", "--out", f"{name}/out"]
@@ -65,7 +65,3 @@ def main() -> None:
                 browser.close()
             finally:
                 live.terminate()
-
-
-if __name__ == "__main__":
-    main()

@@ -18,7 +18,7 @@ from fingervision.domain.frame import Frame, Pixels
 from fingervision.domain.gap import GapMeasurement
 from fingervision.rendering import Camera, TrueGap, render, truth, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 BELOW_PX = 10.2
 CONTRAST, WINDOW_PX = 160.0, 20.0
@@ -97,9 +97,9 @@ def rms(blur: float, noise: float, rows: int, radius: float, frames: int, seed: 
     return [float(e) for e in np.sqrt(np.mean(np.square(errors), axis=0))]
 
 
-def main() -> None:
+@benchmark(frames=60, seed=3)
+def main(options: Namespace) -> None:
     """Print the table."""
-    options = options_of(__doc__, frames=60, seed=3)
     print("blur noise rows radius    bound  fingervision  Otsu+count  find_contours  derivative+parabola")
     for blur, noise, rows, radius in (
         (0.9, 2.0, 20, 0.0), (0.9, 2.0, 1, 0.0), (0.9, 2.0, 60, 0.0), (0.5, 2.0, 20, 0.0), (2.0, 2.0, 20, 0.0),
@@ -110,7 +110,3 @@ def main() -> None:
         limit = f"{bound(blur, noise, rows):8.4f}" if radius == 0.0 else "       -"
         scene = f"{blur:4.1f} {noise:5.1f} {rows:4d} {radius:6.0f}"
         print(f"{scene} {limit} {own:13.4f} {otsu:11.4f} {contour:14.4f} {parabola:20.4f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -18,6 +18,7 @@ from fingervision.rendering import (
     truth,
     two_fingers,
 )
+from tests.benchmarks.frame import Namespace, benchmark
 
 REPEATS = 15
 
@@ -32,7 +33,8 @@ def milliseconds(work: Callable[[], object]) -> float:
     return 1000.0 * sorted(times_s)[REPEATS // 2]
 
 
-def main() -> None:
+@benchmark()
+def main(_: Namespace) -> None:
     """Print the table."""
     rng = np.random.default_rng(0)
     plain = two_fingers(100.3, radius_px=30.0, tilt_deg=(3.0, -8.0))
@@ -64,7 +66,3 @@ def main() -> None:
         frame_ms = milliseconds(lambda scene=scene, camera=camera: render(scene, camera, rng))
         truth_ms = milliseconds(lambda scene=scene, camera=camera: truth(scene, camera, 10.2))
         print(f"{name:34}{exact_ms:10.1f}{frame_ms:10.1f}{truth_ms:10.1f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -39,7 +39,7 @@ from fingervision.vision.pipeline import Settings, measure_frame
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.benchmarks.damaged_files import KINDS, coded
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.scenes.empty import EMPTY
 
 PX_PER_MM = 34.0
@@ -231,16 +231,15 @@ def start_up(runs: int) -> None:
     print(f"\n{'Start-up, fingervision --help':34}{statistics.median(spent):10.2f} s")
 
 
-def main() -> None:
-    asked = options_of(
-        __doc__,
-        frames=1500,
-        runs=5,
-        only={"choices": ["rate", "kinds", "memory", "start"]},
-        sizes={"nargs": "+", "default": SIZES},
-        coders={"nargs": "+", "default": CODERS, "choices": CODERS},
-        lengths={"nargs": 2, "type": int, "default": LENGTHS},
-    )
+@benchmark(
+    frames=1500,
+    runs=5,
+    only={"choices": ["rate", "kinds", "memory", "start"]},
+    sizes={"nargs": "+", "default": SIZES},
+    coders={"nargs": "+", "default": CODERS, "choices": CODERS},
+    lengths={"nargs": 2, "type": int, "default": LENGTHS},
+)
+def main(asked: Namespace) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder, levels = Path(name), pictures() if asked.only in (None, "rate") else []
         if asked.only in (None, "rate"):
@@ -251,7 +250,3 @@ def main() -> None:
             start_up(asked.runs)
         if asked.only in (None, "memory"):
             memory(folder, asked.sizes, asked.coders, asked.lengths)
-
-
-if __name__ == "__main__":
-    main()

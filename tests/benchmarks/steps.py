@@ -18,7 +18,7 @@ from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.binarise import binarise
 from fingervision.vision.grey import denoise
 from fingervision.vision.outlines import find_outlines
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 DENOISE: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "none": lambda a: a,
@@ -39,9 +39,9 @@ OUTLINE: dict[str, Callable[[np.ndarray], object]] = {
 }
 
 
-def main() -> None:
+@benchmark(frames=10, seed=4)
+def main(options: Namespace) -> None:
     """Print the table."""
-    options = options_of(__doc__, frames=10, seed=4)
     rng = np.random.default_rng(options.seed)
     pairs = []
     for _ in range(options.frames):
@@ -61,7 +61,3 @@ def main() -> None:
             darks = [a < 120 if candidates is DENOISE else a for a in answers]
             wrong = np.mean([np.mean(dark != true) for dark, (_, true) in zip(darks, pairs, strict=True)])
             print(f"{name:34s} {spent:8.3f} {wrong:13.6f}")
-
-
-if __name__ == "__main__":
-    main()

@@ -5,7 +5,6 @@ are read in a process of their own, whose time is added. Excel is measured with 
 """
 
 import datetime as dt
-import resource
 import statistics
 import tempfile
 from collections.abc import Callable, Iterator
@@ -14,15 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.tables.read import read_measured_table
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark, processor_s
 
 REPEATS = 3
-
-
-def processor_s() -> float:
-    """Seconds of this process and of those that it has ended."""
-    own, ended = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime
 
 
 def tables(rows: int, folder: Path) -> Iterator[tuple[str, Path]]:
@@ -81,11 +74,11 @@ def tables(rows: int, folder: Path) -> Iterator[tuple[str, Path]]:
     yield "Excel, a tenth", folder / "table.xlsx"
 
 
-def main() -> None:
+@benchmark(rows=1_000_000)
+def main(chosen: Namespace) -> None:
     """Print the table."""
-    rows = options_of(__doc__, rows=1_000_000).rows
     with tempfile.TemporaryDirectory() as folder:
-        for name, path in tables(rows, Path(folder)):
+        for name, path in tables(chosen.rows, Path(folder)):
             spent = []
             for _ in range(REPEATS):
                 before = processor_s()
@@ -93,7 +86,3 @@ def main() -> None:
                 spent.append(processor_s() - before)
             print(f"{name:26} {read:9d} rows {statistics.median(spent):7.2f} s", flush=True)
             path.unlink()
-
-
-if __name__ == "__main__":
-    main()

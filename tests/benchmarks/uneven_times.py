@@ -9,7 +9,6 @@ frames called damaged (must be 0), clocks that are not determined, and verdicts;
 """
 
 import tempfile
-import time
 from collections import Counter, defaultdict
 from fractions import Fraction
 from pathlib import Path
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 import fingervision as fv
 from fingervision.domain.errors import FingervisionError
 from fingervision.rendering import Camera, render, two_fingers
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark, in_turn
 
 Values = NDArray[np.float64]
 PX_PER_MM, FRAME_PX, BELOW_TIP_MM, DURATION_S = 30.0, (320, 96), 0.3, 9.0
@@ -117,23 +116,19 @@ def examined(folder: Path, kind: str, rng: Generator) -> tuple[int, int, str, st
     return times_s.size, damaged, found.verdict, f"{file.name}: {', '.join(each.name for each in found.effects)}"
 
 
-def main() -> None:
+@benchmark(
+    recordings=100,
+    first={"type": int, "default": 0, "help": "number of the first recording, to go on where a run ended"},
+    only={"choices": KINDS},
+    minutes=float("inf"),
+    seed=1,
+    verbose=False,
+)
+def main(chosen: Namespace) -> None:
     """Print the table."""
-    chosen = options_of(
-        __doc__,
-        recordings=100,
-        first={"type": int, "default": 0, "help": "number of the first recording, to go on where a run ended"},
-        only={"choices": KINDS},
-        minutes=float("inf"),
-        seed=1,
-        verbose=False,
-    )
-    until = time.monotonic() + 60.0 * chosen.minutes
     totals: dict[str, Counter[str]] = defaultdict(Counter)
     with tempfile.TemporaryDirectory() as folder:
-        for number in range(chosen.first, chosen.recordings):
-            if time.monotonic() > until:
-                break
+        for number in in_turn(range(chosen.first, chosen.recordings), chosen.minutes):
             kind = KINDS[number % len(KINDS)]
             if chosen.only not in (None, kind):
                 continue
@@ -150,7 +145,3 @@ def main() -> None:
     print(f"{'kind':16}" + "".join(f"{name:>11}" for name in ("recordings", "frames", "damaged", *VERDICTS)))
     for kind, of in sorted(totals.items(), key=lambda each: each[0] == "all"):
         print(f"{kind:16}" + "".join(f"{of[name]:11}" for name in ("recordings", "frames", "damaged", *VERDICTS)))
-
-
-if __name__ == "__main__":
-    main()

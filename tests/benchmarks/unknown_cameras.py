@@ -24,14 +24,14 @@ from numpy.typing import NDArray
 from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame
-from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.source import Description
 from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.task import Task
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX, SIZE_PX, gripper
 from tests.benchmarks.camera_artefacts.optics import Surface, light_on_sensor
 from tests.benchmarks.camera_artefacts.scene import true_gap
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.scores import Scores, percent, rms
 
 Floats = NDArray[np.float64]
 Pictures = list[NDArray[np.uint8]]
@@ -229,49 +229,36 @@ SURFACES = {
 
 
 def row(name: str, recordings: Sequence[Recording], camera: Callable[[Recording], Film]) -> str:
-    error, u, means, lost = [], [], [], 0
-    responses: Counter[str] = Counter()
+    of, means, responses = Scores(), [], Counter[str]()
     task = Task(BareScale(PX_PER_MM), below_tip_mm=BELOW_PX / PX_PER_MM, direction=Direction.UP)
     for recording in recordings:
-        found = measure_in_memory(camera(recording), task)
+        found, before = measure_in_memory(camera(recording), task), len(of.found)
         responses[str(found.summary["settings"]["response"])] += 1
-        mine = []
         for result, gap_px in zip(found.results, recording.gap_px, strict=True):
-            if isinstance(result.outcome, GapMeasurement):
-                mine.append(result.outcome.gap_px - gap_px)
-                u.append(np.hypot(result.outcome.u_gap_px, result.outcome.u_picture_px))
-            else:
-                lost += 1
-        error += mine
-        means += [np.mean(mine)] if mine else []
-    if not error:
+            of.take(result.outcome, gap_px)
+        means += [np.mean([each[0] for each in of.found[before:]])] if len(of.found) > before else []
+    lost = sum(of.lost.values())
+    if not of.found:
         return f"{name:16s} {lost} refused"
-    e, twice = np.array(error), 2.0 * np.array(u)
-    rms = np.sqrt(np.mean(e**2))
-    silent = (np.abs(e) > 0.25) & (np.abs(e) > twice)
+    twice = 2.0 * of.u
     return (
-        f"{name:16s} {rms:7.4f} {np.sqrt(np.mean(np.square(means))):8.4f} {np.median(twice):7.4f} "
-        f"{np.median(twice) / rms:6.1f} {100 * np.mean(np.abs(e) < twice):6.1f} {100 * silent.mean():7.1f} {lost:5d}  "
+        f"{name:16s} {rms(of.error):7.4f} {rms(np.array(means)):8.4f} {np.median(twice):7.4f} "
+        f"{np.median(twice) / rms(of.error):6.1f} {percent(np.abs(of.error) < twice):6.1f} {of.unsaid:7.1f} {lost:5d}  "
         f"{dict(responses)}"
     )
 
 
-def main() -> None:
-    options = options_of(
-        __doc__,
-        recordings=8,
-        frames=20,
-        seed=1,
-        only={"nargs": "*", "choices": list(CLASSES)},
-        surface={"choices": list(SURFACES), "default": "", "help": "what lies beside the edges"},
-    )
+@benchmark(
+    recordings=8,
+    frames=20,
+    seed=1,
+    only={"nargs": "*", "choices": list(CLASSES)},
+    surface={"choices": list(SURFACES), "default": "", "help": "what lies beside the edges"},
+)
+def main(options: Namespace) -> None:
     recordings = [
         drawn(1000 * options.seed + k, options.frames, SURFACES[options.surface]) for k in range(options.recordings)
     ]
     print("class             RMS px  of means   U px  U/RMS   <2u %  silent%  lost  responses")
     for name in options.only or CLASSES:
         print(row(name, recordings, CLASSES[name]), flush=True)
-
-
-if __name__ == "__main__":
-    main()

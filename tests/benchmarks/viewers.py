@@ -25,7 +25,7 @@ from threading import Thread
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 # The page says "no picture" half a second after the last one (`SILENT_S` of the session): what waits four times as
 # long stands still.
@@ -127,9 +127,9 @@ class Cost:
             self.core_s = (int(times[11]) + int(times[12])) / ticks
 
 
-def main() -> None:
+@benchmark(rate_hz=200.0, seconds=3600.0, viewers=4)
+def main(chosen: Namespace) -> None:
     """Print the table."""
-    chosen = options_of(__doc__, rate_hz=200.0, seconds=3600.0, viewers=4)
     with tempfile.TemporaryDirectory() as out:
         command = ["live", "simulated", "--rate-hz", str(chosen.rate_hz), "--port", "0", "--out", str(Path(out) / "o")]
         called = [sys.executable, "-m", "fingervision", *command]
@@ -173,7 +173,3 @@ def main() -> None:
     froze = sum(each.froze for each in seen)
     print(f"viewers that froze (more than {FROZEN_S:g} s without a new picture or row): {froze} of {len(seen)}")
     sys.exit(1 if froze else 0)
-
-
-if __name__ == "__main__":
-    main()

@@ -30,7 +30,7 @@ from fingervision.models.plane_shapes import Polygon
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import triangulate
 from fingervision.storage.gripper_toml import read_gripper
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 Array = NDArray[np.float64]
 
@@ -334,16 +334,9 @@ def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng
     print("two causes: " + ", ".join(f"{name} {count}" for name, count in counts.items()))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+@benchmark(tables=60, seed=1, two={"type": int, "default": 0, "help": "tables with two things hidden"}, verbose=False)
+def main(given: Namespace) -> None:
     """Print the results of all tables, and their statistics."""
-    given = options_of(
-        __doc__,
-        arguments,
-        tables=60,
-        seed=1,
-        two={"type": int, "default": 0, "help": "tables with two things hidden"},
-        verbose=False,
-    )
     began = time.perf_counter()
     answers = PlaceAnswers(drawn())
     things = hidden_things(given.seed)
@@ -387,7 +380,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"places in the answer: tips alone {np.mean(sizes['gap']):.1f}, with bodies {np.mean(sizes['bodies']):.1f}"
         )
     print(f"{time.perf_counter() - began:.0f} s")
-
-
-if __name__ == "__main__":
-    main()

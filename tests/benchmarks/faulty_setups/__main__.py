@@ -22,7 +22,7 @@ from fingervision.inspection.sample import take_sample
 from fingervision.measuring.task import Task
 from tests.benchmarks.faulty_setups.bench import BELOW_MM, PX_PER_MM, Bench, recorded
 from tests.benchmarks.faulty_setups.faults import FAULTS, good
-from tests.benchmarks.options import options_of
+from tests.benchmarks.frame import Namespace, benchmark
 
 
 def inspected(bench: Bench, frames: int, rng: np.random.Generator):
@@ -47,10 +47,8 @@ def inspected(bench: Bench, frames: int, rng: np.random.Generator):
     return findings, error_um, sample
 
 
-def main() -> None:
-    options = options_of(
-        __doc__, setups=500, good=100, frames=8, seed=1, only={"nargs": "*", "choices": list(FAULTS)}, verbose=False
-    )
+@benchmark(setups=500, good=100, frames=8, seed=1, only={"nargs": "*", "choices": list(FAULTS)}, verbose=False)
+def main(options: Namespace) -> None:
     rng = np.random.default_rng(options.seed)
     named, drawn = 0, 0
     print("fault         set-ups  first   stated um   error um   named instead")
@@ -96,7 +94,3 @@ def main() -> None:
             f"nothing to mend: {quiet} of {options.good} good ones ({100 * quiet / options.good:.1f} %), error "
             f"{np.median(errors):.2f} um; {dict(wrong) or ''}"
         )
-
-
-if __name__ == "__main__":
-    main()

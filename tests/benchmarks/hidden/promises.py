@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.hidden.binomial import Rate
 from tests.benchmarks.hidden.catalogue_chain import respond
 from tests.benchmarks.hidden.diagnose_adapter import Answer, diagnose
@@ -26,7 +27,6 @@ from tests.benchmarks.hidden.next_run_gain import Gain, gain_that_came, with_sec
 from tests.benchmarks.hidden.recipe import NotDrivenError, drive, drive_recipe
 from tests.benchmarks.hidden.rows import ROWS
 from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
-from tests.benchmarks.options import options_of
 
 Array = NDArray[np.float64]
 APART = 16.0
@@ -137,9 +137,9 @@ def line_of(index: int, case: Followed) -> str:
     return words
 
 
-def main() -> None:
+@benchmark(tables=40, first=0, seed=1, out=Path("results/promises"))
+def main(chosen: Namespace) -> None:
     """Read the options, process the tables, and print the results."""
-    chosen = options_of(__doc__, tables=40, first=0, seed=1, out=Path("results/promises"))
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     cases, able = [], 0
     for index in range(chosen.first, chosen.first + chosen.tables):
@@ -162,7 +162,3 @@ def main() -> None:
         print(f"came over promised: quartiles {np.round(np.quantile(ratios, [0.25, 0.5, 0.75]), 2)}")
         print(f"promises of 75 and more within 0.7-1.3: {Rate(sum(large), len(large)) if large else 'none'}")
         print(f"smaller promises: interval holds {Rate(sum(small), len(small)) if small else 'none'}")
-
-
-if __name__ == "__main__":
-    main()

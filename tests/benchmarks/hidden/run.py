@@ -8,18 +8,17 @@ METHOD repeats a method. --scheduler tcp://HOST:PORT uses a Dask cluster whose w
 repository. Seeds below 1000 are for development, seeds from 1000 on for results.
 """
 
-import argparse
 import json
 import os
 import shutil
 import time
 import traceback
-from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
+from tests.benchmarks.frame import Namespace, answers, benchmark, listed
 from tests.benchmarks.hidden.binomial import Rate
 from tests.benchmarks.hidden.catalogue_chain import MAP
 from tests.benchmarks.hidden.diagnose_adapter import Answer, diagnose, read_report
@@ -35,7 +34,6 @@ from tests.benchmarks.hidden.score import Mark, intervals, mark, row_lines
 from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
 from tests.benchmarks.hidden.unforeseen import widened
 from tests.benchmarks.hidden.unseen_run import unseen_error_ratio
-from tests.benchmarks.workers import workers
 
 METHODS = ("diagnose", "ideal", "bic", "sindy", "gp")
 PEERS = {"bic": greedy_bic, "sindy": e_sindy}
@@ -161,58 +159,7 @@ def report_of(method: str, results: dict[str, list[dict[str, object]]]) -> list[
     return lines
 
 
-def main() -> None:
-    """Read the options, process the tables, and print the results."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--tables", type=int, default=20, help="tables a row")
-    options.add_argument("--first", type=int, default=0, help="number of the first table")
-    options.add_argument("--jobs", type=int, default=2)
-    options.add_argument("--scheduler", help="Dask cluster, tcp://HOST:PORT; --out on a path that its workers see")
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--rows", default=",".join(ROWS))
-    options.add_argument("--methods", default=",".join(METHODS))
-    options.add_argument("--out", type=Path, default=Path("results/hidden"))
-    options.add_argument("--again", default="", help="method whose kept answers are thrown away")
-    options.add_argument("--misses", type=Path, help="folder that gets a copy of every table that diagnose missed")
-    options.add_argument("--minutes", type=float, default=np.inf, help="begin no table after so many")
-    chosen = options.parse_args()
-    rows, methods = chosen.rows.split(","), chosen.methods.split(",")
-    for what, asked, there in (("rows", rows, ROWS), ("methods", methods, METHODS)):
-        unknown = [name for name in asked if name not in there]
-        if unknown:
-            options.error(f"--{what} must be of {', '.join(there)}, but has {', '.join(unknown)}.")
-    if chosen.tables < 1 or chosen.jobs < 1:
-        options.error(f"--tables and --jobs must be at least 1, but are {chosen.tables} and {chosen.jobs}.")
-    begun = time.perf_counter()
-    tasks = _tasks(chosen, rows, methods)
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-    # All methods for one table run in one process, so that the table is simulated once.
-    results: dict[str, dict[str, list[dict[str, object]]]] = {m: {r: [] for r in rows} for m in methods}
-    batches = [tasks[i : i + len(methods)] for i in range(0, len(tasks), len(methods))]
-    known = [batch for batch in batches if all(task.kept.exists() for task in batch)]
-    for batch in known:
-        for task in batch:
-            results[task.method][task.row].append(marked(task))
-    if chosen.minutes > 0:
-        with workers(chosen.scheduler, chosen.jobs) as pool:
-            waiting = {pool.submit(_batch, batch): batch for batch in batches if batch not in known}
-            for done, future in enumerate(as_completed(waiting), 1):
-                if time.perf_counter() - begun > 60.0 * chosen.minutes:
-                    for later in waiting:
-                        later.cancel()
-                if future.cancelled():
-                    continue
-                for task, result in zip(waiting[future], future.result(), strict=True):
-                    results[task.method][task.row].append(result)
-                    _tell(task, result, chosen.misses)
-                if done % 10 == 0:
-                    print(f"   {done} of {len(waiting)} tables, {time.perf_counter() - begun:.0f} s", flush=True)
-    for method in methods:
-        print("\n".join(report_of(method, results[method])))
-    print(f"seed {chosen.seed}, {time.perf_counter() - begun:.0f} s")
-
-
-def _tasks(chosen: argparse.Namespace, rows: list[str], methods: list[str]) -> list[Task]:
+def _tasks(chosen: Namespace, rows: list[str], methods: list[str]) -> list[Task]:
     """Tables by methods, without the kept answers of the method that is to run again."""
     tasks = [
         Task(row, index, chosen.seed, method, chosen.out.absolute())
@@ -246,5 +193,39 @@ def _tell(task: Task, result: dict[str, object], misses: Path | None) -> None:
             shutil.copytree(str(result["folder"]), misses / name, dirs_exist_ok=True)
 
 
-if __name__ == "__main__":
-    main()
+@benchmark(
+    tables={"type": int, "default": 20, "help": "tables a row"},
+    first={"type": int, "default": 0, "help": "number of the first table"},
+    jobs=2,
+    scheduler={"help": "Dask cluster, tcp://HOST:PORT; --out on a path that its workers see"},
+    seed=1,
+    rows=listed(ROWS),
+    methods=listed(METHODS),
+    out=Path("results/hidden"),
+    again={"default": "", "help": "method whose kept answers are thrown away"},
+    misses={"type": Path, "help": "folder that gets a copy of every table that diagnose missed"},
+    minutes={"type": float, "default": np.inf, "help": "begin no table after so many"},
+)
+def main(chosen: Namespace) -> None:
+    """Read the options, process the tables, and print the results."""
+    begun, rows, methods = time.perf_counter(), chosen.rows, chosen.methods
+    tasks = _tasks(chosen, rows, methods)
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    # All methods for one table run in one process, so that the table is simulated once.
+    results: dict[str, dict[str, list[dict[str, object]]]] = {m: {r: [] for r in rows} for m in methods}
+    batches = [tasks[i : i + len(methods)] for i in range(0, len(tasks), len(methods))]
+    known = [batch for batch in batches if all(task.kept.exists() for task in batch)]
+    for batch in known:
+        for task in batch:
+            results[task.method][task.row].append(marked(task))
+    asked = [batch for batch in batches if batch not in known and chosen.minutes > 0]
+    found = answers(_batch, asked, chosen.jobs, chosen.minutes, chosen.scheduler)
+    for done, (batch, told) in enumerate(found, 1):
+        for task, result in zip(batch, told, strict=True):
+            results[task.method][task.row].append(result)
+            _tell(task, result, chosen.misses)
+        if done % 10 == 0:
+            print(f"   {done} of {len(asked)} tables, {time.perf_counter() - begun:.0f} s", flush=True)
+    for method in methods:
+        print("\n".join(report_of(method, results[method])))
+    print(f"seed {chosen.seed}, {time.perf_counter() - begun:.0f} s")

@@ -9,7 +9,6 @@ absolute error; parts whose width is given, off by more than 3 u; milliseconds a
 writes the pictures of values that are wrong and of refusals.
 """
 
-import argparse
 import time
 import zlib
 from collections import Counter
@@ -22,6 +21,7 @@ import numpy as np
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.vision.pipeline import Settings, measure_frame
+from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.scenes.bench_things import THINGS
 from tests.benchmarks.scenes.canvas import Rng
 from tests.benchmarks.scenes.clutter import CLUTTER
@@ -58,34 +58,6 @@ class Tally:
             f"{name:24s} {columns} {median}  {self.held:5d} {self.held_wrong:5d} {milliseconds:6.1f}  "
             f"{dict(self.lost) or ''}"
         )
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("sets", nargs="*", default=list(SETS))
-    parser.add_argument("--each", type=int, default=10)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="*")
-    parser.add_argument("--save", type=Path)
-    options = parser.parse_args()
-    for chosen in options.sets:
-        print(f"{chosen:24s} frames  value gripng >.25   >3u both   median   held  >3u     ms")
-        every = Tally()
-        for name, draw in SETS[chosen].items():
-            if options.only and not any(word in name for word in options.only):
-                continue
-            rng = np.random.default_rng([options.seed, zlib.crc32(name.encode())])
-            tally = Tally()
-            for number in range(options.each):
-                shot = draw(rng)
-                words = _take(shot, (tally, every))
-                if words and options.save:
-                    options.save.mkdir(parents=True, exist_ok=True)
-                    cv2.imwrite(str(options.save / f"{name}-{number}.png"), shot.picture)
-                    with (options.save / "why.txt").open("a") as file:
-                        file.write(f"{name}-{number}: {words}\n")
-            print(tally.line(name), flush=True)
-        print(every.line("all"), flush=True)
 
 
 def _take(shot: Shot, tallies: tuple[Tally, Tally]) -> str:
@@ -127,5 +99,29 @@ def _take(shot: Shot, tallies: tuple[Tally, Tally]) -> str:
     return words
 
 
-if __name__ == "__main__":
-    main()
+@benchmark(
+    sets=tuple(SETS),
+    each=10,
+    seed=1,
+    only={"nargs": "*"},
+    save={"type": Path},
+)
+def main(options: Namespace) -> None:
+    for chosen in options.sets:
+        print(f"{chosen:24s} frames  value gripng >.25   >3u both   median   held  >3u     ms")
+        every = Tally()
+        for name, draw in SETS[chosen].items():
+            if options.only and not any(word in name for word in options.only):
+                continue
+            rng = np.random.default_rng([options.seed, zlib.crc32(name.encode())])
+            tally = Tally()
+            for number in range(options.each):
+                shot = draw(rng)
+                words = _take(shot, (tally, every))
+                if words and options.save:
+                    options.save.mkdir(parents=True, exist_ok=True)
+                    cv2.imwrite(str(options.save / f"{name}-{number}.png"), shot.picture)
+                    with (options.save / "why.txt").open("a") as file:
+                        file.write(f"{name}-{number}: {words}\n")
+            print(tally.line(name), flush=True)
+        print(every.line("all"), flush=True)

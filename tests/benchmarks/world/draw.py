@@ -6,12 +6,12 @@ For each table, a folder ROW_INDEX with measured.csv, simulation.csv and truth.j
 same files.
 """
 
-import argparse
 import time
 from pathlib import Path
 
 import numpy as np
 
+from tests.benchmarks.frame import Namespace, benchmark, listed
 from tests.benchmarks.world.folder import write
 from tests.benchmarks.world.nearest import Judge
 from tests.benchmarks.world.rig import Rig
@@ -56,22 +56,16 @@ def draw_table(row: str, seed: int, index: int, out: Path) -> Path:
     return folder
 
 
-def main() -> None:
+@benchmark(
+    seed=1,
+    tables={"type": int, "default": 6, "help": "tables a row"},
+    rows={**listed([*ROWS, *ENCODER_KINDS]), "default": list(ROWS)},
+    out={"type": Path, "required": True},
+)
+def main(chosen: Namespace) -> None:
     """Read the options, and write the folders."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--tables", type=int, default=6, help="tables a row")
-    options.add_argument("--rows", default=",".join(ROWS))
-    options.add_argument("--out", type=Path, required=True)
-    chosen = options.parse_args()
-    for row in chosen.rows.split(","):
-        if row not in ROWS | ENCODER_KINDS:
-            options.error(f"--rows must be of {', '.join(ROWS)}, but has {row}.")
+    for row in chosen.rows:
         begun = time.perf_counter()
         for index in range(chosen.tables):
             draw_table(row, chosen.seed, index, chosen.out)
         print(f"{row}: {chosen.tables} tables, {time.perf_counter() - begun:.0f} s", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -7,17 +7,17 @@ results are printed; with --again the diagnoses are repeated. With --tables-from
 used. Seeds below 1000 are for development, other seeds for results.
 """
 
-import argparse
 import json
 import os
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tests.benchmarks.frame import Namespace, answers, benchmark, listed
 from tests.benchmarks.hidden.binomial import Rate
 from tests.benchmarks.world.ask import ask
 from tests.benchmarks.world.draw import draw_table
@@ -28,8 +28,9 @@ Result = dict[str, Any]
 NAMES = ("named", "ambiguous")
 
 
-def work(row: str, seed: int, index: int, tables: Path, answers: Path, again: bool, kept_only: bool) -> Result | None:
+def work(task: tuple[str, int], seed: int, tables: Path, answers: Path, again: bool, kept_only: bool) -> Result | None:
     """Draw, diagnose and mark one table; None if only stored answers are requested and there is none."""
+    row, index = task
     folder, out = tables / f"{row}_{index}", answers / f"{row}_{index}"
     if kept_only and not (out / "answer.json").exists():
         return None
@@ -110,51 +111,40 @@ def tell(r: Result) -> None:
           f"{', leaves too much' if r['leaves'] else ''} {last or ''}", flush=True)  # fmt: skip
 
 
-def main() -> None:
+@benchmark(
+    seed=1,
+    tables={"type": int, "default": 6, "help": "tables a row"},
+    first={"type": int, "default": 0, "help": "number of the first table"},
+    rows={**listed([*ROWS, *ENCODER_KINDS, "encoder_kinds"]), "default": list(ROWS)},
+    jobs=2,
+    minutes={"type": float, "default": np.inf, "help": "begin no table after so many"},
+    out=Path("results/world"),
+    tables_from={"type": Path, "help": "folder with the drawn tables"},
+    answers={"default": "answers", "help": "name under which the answers are kept"},
+    again={"action": "store_true", "help": "ask anew"},
+)
+def main(chosen: Namespace) -> None:
     """Read the options, process the tables, and print the results."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--tables", type=int, default=6, help="tables a row")
-    options.add_argument("--first", type=int, default=0, help="number of the first table")
-    options.add_argument("--rows", default=",".join(ROWS))
-    options.add_argument("--jobs", type=int, default=2)
-    options.add_argument("--minutes", type=float, default=np.inf, help="begin no table after so many")
-    options.add_argument("--out", type=Path, default=Path("results/world"))
-    options.add_argument("--tables-from", type=Path, help="folder with the drawn tables")
-    options.add_argument("--answers", default="answers", help="name under which the answers are kept")
-    options.add_argument("--again", action="store_true", help="ask anew")
-    chosen = options.parse_args()
-    rows = list(ENCODER_KINDS) if chosen.rows == "encoder_kinds" else chosen.rows.split(",")
-    for row in rows:
-        if row not in ROWS | ENCODER_KINDS:
-            options.error(f"--rows must be encoder_kinds, or of {', '.join(ROWS)}, but has {row}.")
+    rows = list(ENCODER_KINDS) if chosen.rows == ["encoder_kinds"] else chosen.rows
     base = chosen.out.absolute() / f"seed{chosen.seed}"
     tables = chosen.tables_from.absolute() if chosen.tables_from else base / "tables"
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     begun, found = time.perf_counter(), list[Result]()
     # All rows are processed in turn, so that an interrupted run has equal numbers of tables for each row.
     tasks = [(row, index) for index in range(chosen.first, chosen.first + chosen.tables) for row in rows]
-    with ProcessPoolExecutor(chosen.jobs) as pool:
-        kept_only = chosen.minutes == 0
-        waiting = [
-            pool.submit(work, row, chosen.seed, index, tables, base / chosen.answers, chosen.again, kept_only)
-            for row, index in tasks
-        ]
-        for future in as_completed(waiting):
-            if not kept_only and time.perf_counter() - begun > 60 * chosen.minutes:
-                for later in waiting:
-                    later.cancel()
-            if future.cancelled():
-                continue
-            result = future.result()
-            if result is not None:
-                found.append(result)
-                tell(result)
+    asked = partial(
+        work,
+        seed=chosen.seed,
+        tables=tables,
+        answers=base / chosen.answers,
+        again=chosen.again,
+        kept_only=chosen.minutes == 0,
+    )
+    for _, result in answers(asked, tasks, chosen.jobs, chosen.minutes or np.inf):
+        if result is not None:
+            found.append(result)
+            tell(result)
     for row in rows:
         print("\n".join(row_lines(row, [r for r in found if r["row"] == row])))
     print("\n".join(summary(found)))
     print(f"seed {chosen.seed}, {time.perf_counter() - begun:.0f} s")
-
-
-if __name__ == "__main__":
-    main()
