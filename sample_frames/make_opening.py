@@ -1,6 +1,7 @@
 """Draw the clip again: the gripper opening and closing at 25 frames per second, with the input that drove it.
 
-Run as `python sample_frames/make_opening.py [FOLDER]`; without a folder the files beside this script are replaced.
+Run as `PYTHONPATH=. python sample_frames/make_opening.py [FOLDER]` from the top; without a folder the files beside this
+script are replaced.
 """
 
 import sys
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import NoGap
 from fingervision.rendering import Camera, Scene, render, truth, two_fingers
-from fingervision.rendering.clip import H264, write_clip
+from tests.clips import h264, write_clip
 
 HERE = Path(__file__).parent
 PX_PER_MM = 34.0
@@ -94,7 +95,7 @@ def main(folder: Path) -> None:
         for i, scene in enumerate(scenes):
             yield Frame(render(scene, CAMERA, rng), i, float(times_s[i]))
 
-    write_clip(folder / "opening.mp4", frames(), H264(crf=19.0))
+    write_clip(folder / "opening.mp4", frames(), h264(crf=19.0))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
 """Render scenes as frames with known true geometry: the outline before blurring, accurate to 0.001 px.
 
 The names that this module exports suffice for most purposes; the README.md of this package explains how scenes are
-rendered and why the result is exact. Compression (`jpeg`, `clip`) and calibration objects (`targets`) are imported
-separately; the compression modules need OpenCV and PyAV.
+rendered and why the result is exact. Calibration objects (`targets`) are imported separately.
 """
 
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera

@@ -1,4 +1,4 @@
-"""Objects of known size for calibration: bars, slots, discs, chessboards, needles."""
+"""Objects of known size for calibration: bars, slots, discs, chessboards."""
 
 from math import radians
 
@@ -6,9 +6,9 @@ from fingervision.domain.errors import DataError
 from fingervision.rendering.outline import Motion, Outline, disc
 from fingervision.rendering.polygon import polygon
 
-__all__ = ["bar", "chessboard", "disc", "needle", "slot"]
+__all__ = ["bar", "chessboard", "disc", "slot"]
 
-# A plate or needle that extends beyond the frame ends at this distance outside.
+# A plate that extends beyond the frame ends at this distance outside.
 BEYOND_FRAME_PX = 200.0
 
 
@@ -64,27 +64,6 @@ def slot(
         )
         raise DataError(msg)
     return polygon(((left, top), (right, top), (right, low), (left, low))), hole.backwards()
-
-
-def needle(diameter_px: float, *, x_px: float, end_y_px: float) -> tuple[Outline]:
-    """A needle that extends into the frame from above, with a square end at `end_y_px`.
-
-    Parameters
-    ----------
-    diameter_px : float
-        The known diameter, along x.
-    x_px : float
-        Position of the needle's axis.
-    end_y_px : float
-        Position of the needle's end.
-
-    Returns
-    -------
-    tuple of Outline
-        One solid.
-    """
-    length_px = end_y_px + BEYOND_FRAME_PX
-    return bar(diameter_px, length_px, x_px=x_px, y_px=end_y_px - length_px / 2)
 
 
 def chessboard(

@@ -8,7 +8,7 @@ import pytest
 
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.rendering.clip import Ffv1, write_clip
+from tests.clips import FFV1, write_clip
 
 PX_PER_MM = 20.0
 
@@ -27,6 +27,6 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("recordings")
     for seed, name in enumerate(("a/good.mkv", "b/good.mkv", "b/good_too.mkv", "c/good_last.mkv")):
         (folder / name).parent.mkdir(exist_ok=True)
-        write_clip(folder / name, frames(12, seed), Ffv1())
+        write_clip(folder / name, frames(12, seed), FFV1)
     (folder / "b" / "broken.mkv").write_bytes(b"this is not a video")
     return folder

@@ -28,8 +28,8 @@ from fingervision.batch.run import MARK
 from fingervision.batch.task import CURVE_POINTS, Digest
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.rendering.clip import H264, write_clip
 from tests.benchmarks.frame import Namespace, benchmark, told
+from tests.clips import h264, write_clip
 
 ROUNDS = 3
 LEAST_RATIO, MOST_S, MOST_MB = 1.7, 10.0, 300.0
@@ -72,7 +72,7 @@ def record_clip(path: Path, frames: int) -> None:
     rng = np.random.default_rng(1)
     scenes = (two_fingers(gap_px=100.0 + k) for k in range(50))
     pictures = [render(scene, Camera(blur_px=0.9, noise_grey=2.0), rng) for scene in scenes]
-    write_clip(path, (Frame(pictures[k % 50], k, 0.04 * k) for k in range(frames)), H264())
+    write_clip(path, (Frame(pictures[k % 50], k, 0.04 * k) for k in range(frames)), h264())
 
 
 def tables_of(out: Path) -> list[str]:

@@ -15,7 +15,6 @@ frames are called damaged, and why.
 import tempfile
 from collections import defaultdict
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -31,45 +30,45 @@ from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
 from tests.benchmarks.frame import Namespace, benchmark, in_turn
+from tests.clips import Codec, coded
 
 RATE_HZ, FRAMES, SIZE_PX = 25.0, 75, (320, 240)
 GREATEST_PX, BELOW_TIP_PX = 60.0, 6.0
 # The fingers of the damaged films open and close by half a pixel a frame.
 GAPS_PX = GREATEST_PX - np.abs(np.arange(FRAMES) % 50 - 25) / 2.0
-LOSSLESS: dict[str, str] = {}
-FFV1 = ("ffv1", "gray", {"level": "3", "slicecrc": "1", "g": "12"})
-MJPEG = ("mjpeg", "yuvj420p", {"qmin": "3", "qmax": "3"})
-H264 = ("libx264", "yuv420p", {"crf": "18", "g": "25"})
-HEVC = ("libx265", "yuv420p", {"crf": "18", "x265-params": "keyint=25:log-level=none"})
-MPEG4 = ("mpeg4", "yuv420p", {"qmin": "3", "qmax": "3", "g": "25", "bf": "0"})
+FFV1 = Codec("ffv1", "gray", {"level": "3", "slicecrc": "1", "g": "12"})
+MJPEG = Codec("mjpeg", "yuvj420p", {"qmin": "3", "qmax": "3"})
+H264 = Codec("libx264", "yuv420p", {"crf": "18", "g": "25"})
+HEVC = Codec("libx265", "yuv420p", {"crf": "18", "x265-params": "keyint=25:log-level=none"})
+MPEG4 = Codec("mpeg4", "yuv420p", {"qmin": "3", "qmax": "3", "g": "25", "bf": "0"})
 REALTIME = {"g": "25", "b": "2M", "deadline": "realtime", "cpu-used": "-8", "threads": "1"}
 KINDS = {
     "ffv1.mkv": FFV1,
     "ffv1.avi": FFV1,
-    "ffv1.mp4": ("ffv1", "gray", {"level": "3", "slicecrc": "1", "g": "1"}),
-    "utvideo.avi": ("utvideo", "yuv420p", LOSSLESS),
-    "utvideo.nut": ("utvideo", "yuv420p", LOSSLESS),
-    "rawvideo.avi": ("rawvideo", "yuv420p", LOSSLESS),
-    "rawvideo.mkv": ("rawvideo", "gray", LOSSLESS),
-    "huffyuv.avi": ("huffyuv", "yuv422p", LOSSLESS),
-    "ffvhuff.avi": ("ffvhuff", "yuv420p", LOSSLESS),
-    "magicyuv.avi": ("magicyuv", "gray", LOSSLESS),
-    "png.mov": ("png", "gray", LOSSLESS),
+    "ffv1.mp4": Codec("ffv1", "gray", {"level": "3", "slicecrc": "1", "g": "1"}),
+    "utvideo.avi": Codec("utvideo", "yuv420p"),
+    "utvideo.nut": Codec("utvideo", "yuv420p"),
+    "rawvideo.avi": Codec("rawvideo", "yuv420p"),
+    "rawvideo.mkv": Codec("rawvideo", "gray"),
+    "huffyuv.avi": Codec("huffyuv", "yuv422p"),
+    "ffvhuff.avi": Codec("ffvhuff", "yuv420p"),
+    "magicyuv.avi": Codec("magicyuv", "gray"),
+    "png.mov": Codec("png", "gray"),
     "mjpeg.mkv": MJPEG,
     "mjpeg.avi": MJPEG,
     "mjpeg.mp4": MJPEG,
-    "prores.mov": ("prores_ks", "yuv422p10le", LOSSLESS),
+    "prores.mov": Codec("prores_ks", "yuv422p10le"),
     "h264.mp4": H264,
     "h264.mkv": H264,
-    "h264.avi": (*H264[:2], {**H264[2], "bf": "0"}),
+    "h264.avi": Codec("libx264", "yuv420p", {**H264.options, "bf": "0"}),
     "h264.ts": H264,
     "hevc.mp4": HEVC,
-    "mpeg2.ts": ("mpeg2video", "yuv420p", {"qmin": "3", "qmax": "3", "g": "25"}),
+    "mpeg2.ts": Codec("mpeg2video", "yuv420p", {"qmin": "3", "qmax": "3", "g": "25"}),
     "mpeg4.mp4": MPEG4,
     "mpeg4.avi": MPEG4,
-    "vp8.webm": ("libvpx", "yuv420p", {**REALTIME, "lag-in-frames": "0"}),
-    "vp9.mkv": ("libvpx-vp9", "yuv420p", {**REALTIME, "error-resilient": "1"}),
-    "av1.mp4": ("libsvtav1", "yuv420p", {"crf": "30", "g": "25", "preset": "10"}),
+    "vp8.webm": Codec("libvpx", "yuv420p", {**REALTIME, "lag-in-frames": "0"}),
+    "vp9.mkv": Codec("libvpx-vp9", "yuv420p", {**REALTIME, "error-resilient": "1"}),
+    "av1.mp4": Codec("libsvtav1", "yuv420p", {"crf": "30", "g": "25", "preset": "10"}),
 }
 """Coder, format of the pixels and options; the suffix names the container. AVI holds no frames out of order."""
 PAGE = 4096
@@ -132,18 +131,10 @@ def film_gaps_px(what: str, k: np.ndarray, rng: np.random.Generator) -> np.ndarr
     return 45.0 + 0.2 * np.sin(k / 5.0)
 
 
-def coded(path: Path, frames: list[Frame], coder: str, pixel_format: str, options: dict[str, str]) -> None:
-    """Write a film as a camera's program does."""
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(coder, rate=int(RATE_HZ), options=options)
-        stream.width, stream.height, stream.pix_fmt = frames[0].width_px, frames[0].height_px, pixel_format
-        for frame in frames:
-            picture = av.VideoFrame.from_ndarray(frame.pixels, format="gray").reformat(
-                format=pixel_format, src_color_range="JPEG", dst_color_range="JPEG"
-            )
-            picture.pts, picture.time_base = frame.index, Fraction(1, int(RATE_HZ))
-            container.mux(stream.encode(picture))
-        container.mux(stream.encode(None))
+def written(path: Path, frames: list[Frame]) -> None:
+    """Write a film as a camera's program does, in the kind of file that its name says."""
+    levels = [frame.pixels for frame in frames]
+    coded(path, levels, KINDS[path.name], rate_hz=int(RATE_HZ), src_color_range="JPEG", dst_color_range="JPEG")
 
 
 def rows(path: Path) -> list[Row]:
@@ -239,7 +230,7 @@ def measure_sound(folder: Path, kinds: list[str], films: int, seed: int, minutes
     for number in in_turn(range(films), minutes):
         kind, motion = kinds[number % len(kinds)], MOTIONS[number // 2 % len(MOTIONS)]
         path = folder / kind
-        coded(path, sound_film(motion, np.random.default_rng([seed, number])), *KINDS[kind])
+        written(path, sound_film(motion, np.random.default_rng([seed, number])))
         results = measure_in_memory(open_source(str(path)), TASK).results
         bad = [each for each in results if each.outcome.status is Status.DAMAGED]
         measured = sum(each.outcome.status is Status.OK for each in results)
@@ -259,7 +250,7 @@ def measure_damaged(folder: Path, kinds: list[str], chosen: Namespace) -> None:
     frames, originals, ran = film(GAPS_PX), {}, 0
     for kind in kinds:
         path = folder / kind
-        coded(path, frames, *KINDS[kind])
+        written(path, frames)
         whole = [row for row in rows(path) if row.gap_px is not None]
         originals[kind] = (
             path.read_bytes(),

@@ -16,8 +16,8 @@ from fingervision.domain.frame import Frame
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.mechanism_bodies import bodies_of, plate_poses
 from fingervision.rendering import Camera, Patch, Scene, render
-from fingervision.rendering.deformed_plate import deformed_outlines
 from tests.benchmarks.which_hinge import HINGES, Array, drawn, shifted, slip_at, slipping_fields, thicker
+from tests.deformed_plate import deformed_outlines
 
 NODES = (-0.3, 0.45, 1.2)
 """Equilibria through which, and through rest, displacements are a polynomial of the input (mm)."""

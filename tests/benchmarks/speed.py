@@ -34,13 +34,13 @@ from fingervision.frames.source import open_source
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.rendering.clip import H264, write_clip
 from fingervision.vision.pipeline import Settings, measure_frame
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from tests.benchmarks.damaged_files import KINDS, coded
+from tests.benchmarks.damaged_files import KINDS
 from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.scenes.empty import EMPTY
+from tests.clips import coded, h264, write_clip
 
 PX_PER_MM = 34.0
 BELOW_PX = 0.3 * PX_PER_MM
@@ -62,7 +62,7 @@ def pictures() -> list[Pixels]:
 
 
 def write(path: Path, count: int, levels: list[Pixels]) -> None:
-    write_clip(path, (Frame(levels[k % len(levels)], k, k / 25.0) for k in range(count)), H264(CRF))
+    write_clip(path, (Frame(levels[k % len(levels)], k, k / 25.0) for k in range(count)), h264(CRF))
 
 
 def decode(path: Path) -> int:
@@ -211,7 +211,7 @@ def memory(folder: Path, sizes: list[str], coders: list[str], lengths: list[int]
         clip = [Frame(shown[k % len(shown)], k, k / RATE_HZ) for k in range(RENDERED_FOR_MEMORY)]
         for kind in coders:
             drawn = folder / kind
-            coded(drawn, clip, *KINDS[kind])
+            coded(drawn, (frame.pixels for frame in clip), KINDS[kind], src_color_range="JPEG", dst_color_range="JPEG")
             peaks = []
             for count in lengths:
                 path = folder / f"{count}-{kind}"

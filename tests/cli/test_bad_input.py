@@ -14,7 +14,7 @@ from fingervision.cli import cli, main
 from fingervision.cli._command import Number
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.rendering.clip import Ffv1, write_clip
+from tests.clips import FFV1, write_clip
 
 MODEL = 'schema = 1\nbase = "sim.csv"\n'
 RECIPE = 'schema = 1\nname = "x"\nbelow_force_n = 5.0\n'
@@ -91,7 +91,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rng = np.random.default_rng(0)
     scenes = [two_fingers(60.0 + k, below_tip_px=6.0, width_px=40.0, frame=(240, 200)) for k in range(2)]
     frames = (Frame(render(each, Camera(), rng), k, 0.04 * k) for k, each in enumerate(scenes))
-    write_clip(found / "c.mkv", frames, Ffv1())
+    write_clip(found / "c.mkv", frames, FFV1)
     (found / "good").mkdir()
     cv2.imwrite(str(found / "good" / "a.png"), render(scenes[0], Camera(), rng))
     for name, content in FILES.items():

@@ -21,8 +21,8 @@ from calib.measured_scale import Calibration, Reference, ScalePart
 from fingervision.cli import main
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.rendering.clip import H264, Ffv1, write_clip
 from fingervision.storage.calibration_json import write_calibration
+from tests.clips import FFV1, h264, write_clip
 
 PX_PER_MM = 20.0
 SCALE = ("--px-per-mm", f"{PX_PER_MM:g}")
@@ -66,7 +66,7 @@ def frames(count: int) -> Iterator[Frame]:
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("clip") / "opening.mkv"
-    write_clip(path, frames(12), Ffv1())
+    write_clip(path, frames(12), FFV1)
     return path
 
 
@@ -109,7 +109,7 @@ def test_every_step_of_a_frame_is_a_numbered_picture(run: Run, clip: Path) -> No
 
 
 def test_a_lossy_clip_is_advised_to_be_lossless(run: Run, tmp_path: Path) -> None:
-    write_clip(tmp_path / "lossy.mp4", frames(2), H264())
+    write_clip(tmp_path / "lossy.mp4", frames(2), h264())
     code, out, _ = run(tmp_path / "lossy.mp4", *SCALE)
     assert code == 0
     assert "The recording is compressed with loss (h264)" in out
@@ -230,7 +230,7 @@ def test_a_clip_cut_off_in_the_middle_is_measured_and_said_to_be_damaged(run: Ru
 
 
 def test_an_mp4_without_its_end_cannot_be_opened(run: Run, tmp_path: Path) -> None:
-    write_clip(tmp_path / "whole.mp4", frames(4), H264())
+    write_clip(tmp_path / "whole.mp4", frames(4), h264())
     content = (tmp_path / "whole.mp4").read_bytes()
     (tmp_path / "cut.mp4").write_bytes(content[: len(content) // 2])
     code, _, err = run("cut.mp4", *SCALE)
@@ -265,7 +265,7 @@ def test_images_that_change_size_are_damaged(run: Run, tmp_path: Path) -> None:
 
 def test_a_black_recording_has_a_table_and_no_number(run: Run, tmp_path: Path) -> None:
     black = (Frame(np.zeros((100, 120), np.uint8), k, 0.04 * k) for k in range(3))
-    write_clip(tmp_path / "black.mkv", black, Ffv1())
+    write_clip(tmp_path / "black.mkv", black, FFV1)
     code, _, err = run("black.mkv", *SCALE)
     assert code == 1
     assert "None of the 3 frames could be measured (3 low_contrast)." in err
@@ -281,7 +281,7 @@ def write_endless(path: Path) -> None:
     scene = two_fingers(60.0, below_tip_px=0.3 * PX_PER_MM, width_px=40.0, frame=(240, 200))
     frame = Frame(render(scene, Camera(blur_px=0.9, noise_grey=0.0), np.random.default_rng(0)), 0, 0.0)
     once = path.with_stem("once")
-    write_clip(once, [frame], Ffv1())
+    write_clip(once, [frame], FFV1)
     with av.open(once) as first, av.open(path, "w") as container:
         stream = container.add_stream_from_template(first.streams.video[0])
         stream.time_base = Fraction(1, 1000)
@@ -323,7 +323,7 @@ def test_a_full_disk_is_said_and_leaves_whole_rows(tmp_path: Path) -> None:
         pytest.skip(f"a disk of 16 kB cannot be mounted here: {mounted.stderr.strip()}")
     try:
         (frame,) = frames(1)
-        write_clip(tmp_path / "clip.mkv", (Frame(frame.pixels, k, 0.04 * k) for k in range(200)), Ffv1())
+        write_clip(tmp_path / "clip.mkv", (Frame(frame.pixels, k, 0.04 * k) for k in range(200)), FFV1)
         done = subprocess.run(
             subprocess_of(tmp_path / "clip.mkv", *SCALE, "--out", disk / "out"),
             capture_output=True,

@@ -11,7 +11,7 @@ import pytest
 
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.rendering.clip import Ffv1, write_clip
+from tests.clips import FFV1, write_clip
 
 PATIENCE_S = 120.0
 SCALE = ("--px-per-mm", "20")
@@ -22,7 +22,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("clip") / "clip.mkv"
     rng = np.random.default_rng(0)
     scenes = [two_fingers(60.0 + k, below_tip_px=6.0, width_px=40.0, frame=(240, 200)) for k in range(3)]
-    write_clip(path, (Frame(render(each, Camera(), rng), k, 0.04 * k) for k, each in enumerate(scenes)), Ffv1())
+    write_clip(path, (Frame(render(each, Camera(), rng), k, 0.04 * k) for k, each in enumerate(scenes)), FFV1)
     return path
 
 

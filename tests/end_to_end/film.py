@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.rendering.clip import Ffv1, write_clip
+from tests.clips import FFV1, write_clip
 
 Array = NDArray[np.float64]
 
@@ -81,4 +81,4 @@ def shoot(film: Film, folder: Path, seed: int) -> None:
             )
             yield Frame(render(scene, film.camera, rng), index, time_s + film.late_s)
 
-    write_clip(folder / "film.mkv", frames(), Ffv1())
+    write_clip(folder / "film.mkv", frames(), FFV1)

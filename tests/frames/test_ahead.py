@@ -9,8 +9,6 @@ import pytest
 
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.ahead import FRAMES_AHEAD, decoded_ahead
-from fingervision.frames.rendered import RenderedFrames
-from fingervision.rendering import Camera, two_fingers
 
 
 def numbered(count: int) -> Iterator[Frame | LostFrame]:
@@ -51,11 +49,3 @@ def test_little_is_read_ahead_and_nothing_after_the_reader_leaves() -> None:
     frames.close()
     assert len(read) <= 5 + FRAMES_AHEAD + 2
     assert decoders() == 0
-
-
-def test_rendered_frames_are_a_source() -> None:
-    scenes = [two_fingers(gap, frame=(160, 120), width_px=30.0) for gap in (30.0, 40.0)]
-    source = RenderedFrames(scenes, Camera(), np.random.default_rng(0), rate_hz=10.0)
-    items = list(source)
-    assert [item.time_s for item in items] == [0.0, 0.1]
-    assert (source.description.width_px, source.description.height_px) == (160, 120)

@@ -1,7 +1,6 @@
 """Damaged recordings: every frame passed on as undamaged shows the undamaged recording's picture of that time."""
 
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -13,6 +12,7 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.file_pictures import AviPlaces
 from fingervision.frames.source import open_source
 from fingervision.frames.told_times import EvenRow, believable
+from tests import clips
 
 RATE_HZ, COUNT, SIZE_PX = 25, 60, (96, 64)
 GREY = {"ffv1": "gray", "mjpeg": "yuvj420p", "libx264": "yuv420p"}
@@ -27,15 +27,7 @@ def film() -> list[NDArray[np.uint8]]:
 
 
 def coded(path: Path, coder: str, **options: str) -> bytes:
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(coder, rate=RATE_HZ, options=options)
-        stream.width, stream.height, stream.pix_fmt = *SIZE_PX, GREY[coder]
-        for k, levels in enumerate(film()):
-            picture = av.VideoFrame.from_ndarray(levels, format="gray").reformat(format=GREY[coder])
-            picture.pts, picture.time_base = k, Fraction(1, RATE_HZ)
-            container.mux(stream.encode(picture))
-        container.mux(stream.encode(None))
-    return path.read_bytes()
+    return clips.coded(path, film(), clips.Codec(coder, GREY[coder], options), rate_hz=RATE_HZ)
 
 
 def packets(path: Path) -> list[bytes]:

@@ -1,29 +1,21 @@
 """Checksums of Matroska clusters: for a codec without own checksums, the cluster is lost no wrong picture shown."""
 
-from fractions import Fraction
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
 
 from fingervision.domain.frame import Frame
 from fingervision.frames.matroska_checksums import CLUSTER
 from fingervision.frames.source import open_source
-from tests.frames.test_damage import COUNT, RATE_HZ, SIZE_PX, film, nothing_wrong, packets, read
+from tests.clips import Codec, coded
+from tests.frames.test_damage import COUNT, RATE_HZ, film, nothing_wrong, packets, read
 
 OPTIONS = {"g": "12", "b": "300k", "deadline": "realtime", "cpu-used": "8", "lag-in-frames": "0"}
 
 
 def recorded(path: Path, coder: str) -> Path:
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(coder, rate=RATE_HZ, options=OPTIONS)
-        stream.width, stream.height, stream.pix_fmt = *SIZE_PX, "yuv420p"
-        for k, levels in enumerate(film()):
-            picture = av.VideoFrame.from_ndarray(levels, format="gray").reformat(format="yuv420p")
-            picture.pts, picture.time_base = k, Fraction(1, RATE_HZ)
-            container.mux(stream.encode(picture))
-        container.mux(stream.encode(None))
+    coded(path, film(), Codec(coder, "yuv420p", OPTIONS), rate_hz=RATE_HZ)
     return path
 
 

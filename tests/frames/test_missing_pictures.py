@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -14,6 +13,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.frames.luma import luma
 from fingervision.frames.source import open_source
+from tests import clips
 
 RATE_HZ, COUNT, SIZE_PX = 25, 90, (96, 64)
 KINDS: dict[str, dict[str, str]] = {
@@ -34,15 +34,10 @@ def coded(
     """Write a moving pattern, and return the decoded pictures of the complete file by time."""
     x, y = np.meshgrid(np.arange(SIZE_PX[0]), np.arange(SIZE_PX[1]))
     still = np.random.default_rng(4).integers(0, 40, x.shape)
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(coder, rate=RATE_HZ, options=options)
-        stream.width, stream.height, stream.pix_fmt = *SIZE_PX, "yuv420p"
-        for k, tick in enumerate(ticks):
-            levels = (100 + 60 * np.sin((x + 1.7 * k) / 6.0) * np.cos(y / 7.0) + still).astype(np.uint8)
-            picture = av.VideoFrame.from_ndarray(levels, format="gray").reformat(format="yuv420p")
-            picture.pts, picture.time_base = tick, Fraction(1, RATE_HZ)
-            container.mux(stream.encode(picture))
-        container.mux(stream.encode(None))
+    levels = (
+        (100 + 60 * np.sin((x + 1.7 * k) / 6.0) * np.cos(y / 7.0) + still).astype(np.uint8) for k in range(len(ticks))
+    )
+    clips.coded(path, levels, clips.Codec(coder, "yuv420p", options), rate_hz=RATE_HZ, ticks=ticks)
     return shown(path)
 
 

@@ -13,7 +13,7 @@ from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.source import Wish, open_source
-from fingervision.rendering.clip import H264, Ffv1, Mjpeg, write_clip
+from tests.clips import FFV1, Codec, h264, mjpeg, write_clip
 
 # Matroska rounds a time to its tick of 1 ms; MP4 keeps the 90 kHz clock's tick.
 MATROSKA_TICK_S, MP4_TICK_S = 0.5e-3 + 1e-9, 0.5 / 90_000 + 1e-9
@@ -46,7 +46,7 @@ def statuses(items: list[Frame | LostFrame]) -> list[Status]:
 @pytest.mark.parametrize(("suffix", "tick_s"), [(".mkv", MATROSKA_TICK_S), (".mp4", MP4_TICK_S), (".mov", MP4_TICK_S)])
 def test_times_are_the_containers_own_also_at_a_changing_rate(tmp_path: Path, suffix: str, tick_s: float) -> None:
     path = tmp_path / f"clip{suffix}"
-    write_clip(path, timed(smooth_pictures(8), UNEVEN_TIMES_S), H264())
+    write_clip(path, timed(smooth_pictures(8), UNEVEN_TIMES_S), h264())
     found = read(path)
     assert statuses(found) == [Status.OK] * 8
     assert [item.time_s for item in found] == pytest.approx(UNEVEN_TIMES_S, abs=tick_s)
@@ -55,7 +55,7 @@ def test_times_are_the_containers_own_also_at_a_changing_rate(tmp_path: Path, su
 def test_a_track_may_state_the_sum_of_its_durations_or_the_time_that_it_is_shown(tmp_path: Path) -> None:
     # FFmpeg of PyAV 19 states the sum; with uneven times and another order of storage it is shorter than what is shown.
     path = tmp_path / "clip.mp4"
-    write_clip(path, timed(smooth_pictures(8), UNEVEN_TIMES_S), H264())
+    write_clip(path, timed(smooth_pictures(8), UNEVEN_TIMES_S), h264())
     content = bytearray(path.read_bytes())
     at = content.index(b"mdhd") + 4 + 4 + 8 + 4  # version and flags, two dates, ticks a second
     with av.open(str(path)) as container:
@@ -68,7 +68,7 @@ def test_a_track_may_state_the_sum_of_its_durations_or_the_time_that_it_is_shown
 
 def test_luma_of_a_lossless_grey_clip_is_the_frame_itself(tmp_path: Path) -> None:
     levels = pictures(3, size=(47, 61))  # rows are padded in the decoder's memory
-    write_clip(tmp_path / "clip.mkv", timed(levels), Ffv1())
+    write_clip(tmp_path / "clip.mkv", timed(levels), FFV1)
     found = read(tmp_path / "clip.mkv")
     for item, level in zip(found, levels, strict=True):
         assert isinstance(item, Frame)
@@ -82,7 +82,7 @@ def test_sixteen_bits_and_colours_come_back_exactly(tmp_path: Path) -> None:
         ("wide.mkv", rng.integers(0, 65536, (48, 64), dtype=np.uint16)),
         ("colour.mkv", rng.integers(0, 256, (48, 64, 3), dtype=np.uint8)),
     ):
-        write_clip(tmp_path / name, [Frame(levels, 0, 0.0)], Ffv1())
+        write_clip(tmp_path / name, [Frame(levels, 0, 0.0)], FFV1)
         (item,) = read(tmp_path / name)
         assert isinstance(item, Frame)
         np.testing.assert_array_equal(item.pixels, levels)
@@ -136,9 +136,9 @@ def test_packed_luma_of_a_usb_camera(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("codec", "coding"), [(Ffv1(), Coding.LOSSLESS), (Mjpeg(), Coding.INTRAFRAME), (H264(), Coding.INTERFRAME)]
+    ("codec", "coding"), [(FFV1, Coding.LOSSLESS), (mjpeg(), Coding.INTRAFRAME), (h264(), Coding.INTERFRAME)]
 )
-def test_the_codec_says_what_was_lost(tmp_path: Path, codec: Ffv1 | Mjpeg | H264, coding: Coding) -> None:
+def test_the_codec_says_what_was_lost(tmp_path: Path, codec: Codec, coding: Coding) -> None:
     write_clip(tmp_path / "clip.mkv", timed(smooth_pictures(2)), codec)
     source = open_source(str(tmp_path / "clip.mkv"))
     assert source.description.coding is coding
@@ -174,10 +174,8 @@ def test_a_repeated_time_is_a_duplicate_and_equal_pictures_are_not(tmp_path: Pat
     assert statuses(read(tmp_path / "clip.mkv")) == [Status.OK, Status.OK, Status.DUPLICATE, Status.OK]
 
 
-@pytest.mark.parametrize("codec", [Ffv1(), H264(), Mjpeg()])
-def test_what_is_there_of_a_clip_cut_off_is_read_and_then_it_is_damaged(
-    tmp_path: Path, codec: Ffv1 | H264 | Mjpeg
-) -> None:
+@pytest.mark.parametrize("codec", [FFV1, h264(), mjpeg()])
+def test_what_is_there_of_a_clip_cut_off_is_read_and_then_it_is_damaged(tmp_path: Path, codec: Codec) -> None:
     write_clip(tmp_path / "whole.mkv", timed(pictures(50)), codec)
     content = (tmp_path / "whole.mkv").read_bytes()
     (tmp_path / "cut.mkv").write_bytes(content[: len(content) // 2])
@@ -191,7 +189,7 @@ def test_what_is_there_of_a_clip_cut_off_is_read_and_then_it_is_damaged(
 
 
 def test_flipped_bytes_in_a_lossless_clip_fail_their_checksum(tmp_path: Path) -> None:
-    write_clip(tmp_path / "clip.mkv", timed(pictures(20)), Ffv1())
+    write_clip(tmp_path / "clip.mkv", timed(pictures(20)), FFV1)
     content = bytearray((tmp_path / "clip.mkv").read_bytes())
     content[len(content) // 2] ^= 0xFF
     (tmp_path / "flipped.mkv").write_bytes(content)
@@ -207,7 +205,7 @@ def test_flipped_bytes_in_a_lossless_clip_fail_their_checksum(tmp_path: Path) ->
 
 def test_behind_damage_that_the_decoder_notices_nothing_wrong_passes_as_whole(tmp_path: Path) -> None:
     # H.264 has no checksum: a decoder may miss the damage itself, but what follows its first complaint is known.
-    write_clip(tmp_path / "clip.mkv", timed(smooth_pictures(60)), H264())
+    write_clip(tmp_path / "clip.mkv", timed(smooth_pictures(60)), h264())
     content = (tmp_path / "clip.mkv").read_bytes()
     truth = {item.time_s: item for item in read(tmp_path / "clip.mkv")}
     noticed = 0
@@ -228,7 +226,7 @@ def test_behind_damage_that_the_decoder_notices_nothing_wrong_passes_as_whole(tm
 
 
 def test_a_second_pass_reads_the_same(tmp_path: Path) -> None:
-    write_clip(tmp_path / "clip.mp4", timed(smooth_pictures(5)), H264())
+    write_clip(tmp_path / "clip.mp4", timed(smooth_pictures(5)), h264())
     source = open_source(str(tmp_path / "clip.mp4"))
     for first, second in zip(source, source, strict=True):
         assert isinstance(first, Frame)
@@ -261,7 +259,7 @@ def test_sound_alone_is_no_video(tmp_path: Path) -> None:
 
 
 def test_a_rate_is_refused_for_what_has_times(tmp_path: Path) -> None:
-    write_clip(tmp_path / "clip.mp4", timed(smooth_pictures(2)), H264())
+    write_clip(tmp_path / "clip.mp4", timed(smooth_pictures(2)), h264())
     with pytest.raises(UsageError, match="is a video with its own times: leave --rate-hz out"):
         open_source(str(tmp_path / "clip.mp4"), Wish(rate_hz=25.0))
 

@@ -1,7 +1,6 @@
 """A damaged stream: every frame that was lost in the live view is lost in the recording, too."""
 
 from dataclasses import asdict
-from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -19,13 +18,16 @@ from fingervision.live.supervisor import Supervisor
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
+from tests import clips
 
 COUNT, RATE_HZ, SIZE_PX, SCALE = 60, 25, (160, 120), 17.0
 CODERS = {
-    "h264": ("libx264", "yuv420p", {"g": "20", "bf": "0", "crf": "18"}),
-    "vp9": ("libvpx-vp9", "yuv420p", {"g": "40", "deadline": "realtime", "cpu-used": "8", "lag-in-frames": "0"}),
-    "av1": ("libsvtav1", "yuv420p", {"g": "40", "preset": "10", "svtav1-params": "pred-struct=1"}),
-    "mjpeg": ("mjpeg", "yuvj420p", {"qmin": "3", "qmax": "3"}),
+    "h264": clips.Codec("libx264", "yuv420p", {"g": "20", "bf": "0", "crf": "18"}),
+    "vp9": clips.Codec(
+        "libvpx-vp9", "yuv420p", {"g": "40", "deadline": "realtime", "cpu-used": "8", "lag-in-frames": "0"}
+    ),
+    "av1": clips.Codec("libsvtav1", "yuv420p", {"g": "40", "preset": "10", "svtav1-params": "pred-struct=1"}),
+    "mjpeg": clips.Codec("mjpeg", "yuvj420p", {"qmin": "3", "qmax": "3"}),
 }
 
 
@@ -37,17 +39,9 @@ def film() -> list[np.ndarray]:
 
 def coded(path: Path, film: list[np.ndarray], coder: str, container_format: str | None = None) -> list[int]:
     """Write the video, and return the position of each packet in the file."""
-    name, pixel_format, options = CODERS[coder]
-    with av.open(str(path), "w", format=container_format) as container:
-        stream = container.add_stream(name, rate=RATE_HZ, options=options)
-        stream.width, stream.height, stream.pix_fmt = *SIZE_PX, pixel_format
-        for k, levels in enumerate(film):
-            picture = av.VideoFrame.from_ndarray(levels, format="gray").reformat(format=pixel_format)
-            # A camera of an even clock that skips a picture: nothing is lost on the way.
-            skipped = int(coder in ("vp9", "av1") and k > 50)
-            picture.pts, picture.time_base = k + skipped, Fraction(1, RATE_HZ)
-            container.mux(stream.encode(picture))
-        container.mux(stream.encode(None))
+    # A camera of an even clock that skips a picture: nothing is lost on the way.
+    ticks = [k + int(coder in ("vp9", "av1") and k > 50) for k in range(len(film))]
+    clips.coded(path, film, CODERS[coder], rate_hz=RATE_HZ, ticks=ticks, container_format=container_format)
     if container_format == "mpjpeg":
         return []
     with av.open(str(path)) as container:

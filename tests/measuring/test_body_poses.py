@@ -17,10 +17,10 @@ from fingervision.measuring.body_poses import BodyTracker
 from fingervision.measuring.drawing_placement import GivenPoint, by_points, by_silhouette, parse_point
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.rendering import Camera, Patch, Scene, render
-from fingervision.rendering.deformed_plate import deformed_outlines
 from fingervision.rendering.polygon import polygon
 from fingervision.storage.bodies_csv import add_channels, write_bodies
 from fingervision.storage.mechanism_toml import mechanism_from_tables
+from tests.deformed_plate import deformed_outlines
 from tests.diagnosis.lever_drawing import TABLES
 
 SCALE, WIDTH, HEIGHT = 5.0, 270, 500

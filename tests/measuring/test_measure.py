@@ -20,7 +20,7 @@ from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.region import Region
 from fingervision.domain.status import Status
-from fingervision.frames.rendered import RenderedFrames
+from fingervision.frames.arrays import ArrayFrames
 from fingervision.frames.source import Description
 from fingervision.measuring.measure import Measured, measure
 from fingervision.measuring.task import Task
@@ -42,8 +42,9 @@ def opening(count: int, direction: Direction = Direction.UP) -> list[Scene]:
     ]
 
 
-def rendered(scenes: list[Scene], seed: int = 0, rate_hz: float | None = 25.0) -> RenderedFrames:
-    return RenderedFrames(scenes, CAMERA, np.random.default_rng(seed), rate_hz)
+def rendered(scenes: list[Scene], seed: int = 0, rate_hz: float | None = 25.0) -> ArrayFrames:
+    rng = np.random.default_rng(seed)
+    return ArrayFrames(np.stack([render(scene, CAMERA, rng) for scene in scenes]), rate_hz)
 
 
 def rows_of(measured: Measured) -> list[dict[str, str]]:
@@ -91,13 +92,13 @@ def test_the_true_gaps_come_out_in_millimetres(tmp_path: Path, direction: Direct
 
 
 def test_two_measurements_at_once_never_share_a_folder(tmp_path: Path) -> None:
-    class Second(RenderedFrames):
+    class Second(ArrayFrames):
         def __iter__(self) -> Iterator[Frame | LostFrame]:
             with pytest.raises(OutputError, match="in use by another run"):
                 measure(rendered(opening(2)), Task(BareScale(PX_PER_MM)), tmp_path)
             yield from super().__iter__()
 
-    first = Second(opening(3), CAMERA, np.random.default_rng(0), 25.0)
+    first = Second(rendered(opening(3)).pictures, 25.0)
     measured = measure(first, Task(BareScale(PX_PER_MM)), tmp_path)
     assert len(rows_of(measured)) == 3
     assert sorted(path.name for path in tmp_path.iterdir()) == ["gap.png", "gaps.csv", "summary.json"]

@@ -2,14 +2,13 @@
 
 import subprocess
 import sys
-from fractions import Fraction
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
 
 from fingervision.rendering import Camera, render, two_fingers
+from tests.clips import Codec, coded
 
 # Largest ratio of the peaks for 1500 and 60 frames (design: 10 minutes within 1.1 times the peak of 10 seconds).
 LENGTHS, MOST_GROWTH = (60, 1500), 1.1
@@ -24,14 +23,8 @@ def recording(path: Path, coder: str, options: dict[str, str], count: int) -> Pa
     """Fingers that jump from frame to frame, with noise that no codec can leave out."""
     scenes = [two_fingers(60.0 + 6.0 * k, below_tip_px=6.0, width_px=60.0, frame=(320, 240)) for k in range(5)]
     shown = [render(scene, Camera(noise_grey=4.0), np.random.default_rng(k)) for k, scene in enumerate(scenes)]
-    with av.open(path, "w") as container:
-        stream = container.add_stream(coder, rate=25, options=options)
-        stream.width, stream.height, stream.pix_fmt = 320, 240, "yuvj420p" if coder == "mjpeg" else "yuv420p"
-        for k in range(count):
-            picture = av.VideoFrame.from_ndarray(shown[k % len(shown)], format="gray").reformat(format=stream.pix_fmt)
-            picture.pts, picture.time_base = k, Fraction(1, 25)
-            container.mux(stream.encode(picture))
-        container.mux(stream.encode(None))
+    levels = (shown[k % len(shown)] for k in range(count))
+    coded(path, levels, Codec(coder, "yuvj420p" if coder == "mjpeg" else "yuv420p", options))
     return path
 
 

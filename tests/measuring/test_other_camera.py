@@ -12,7 +12,7 @@ from fingervision.frames.source import open_source
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.rendering.clip import Ffv1, write_clip
+from tests.clips import FFV1, write_clip
 
 SIZE_PX = (240, 200)
 SETTINGS = {"format": "YUYV", "exposure": "8 ms", "focus": "30"}
@@ -22,7 +22,7 @@ SETTINGS = {"format": "YUYV", "exposure": "8 ms", "focus": "30"}
 def video(tmp_path: Path) -> Path:
     scene = two_fingers(80.0, below_tip_px=6.0, width_px=40.0, frame=SIZE_PX)
     picture = render(scene, Camera(blur_px=0.9, noise_grey=1.0), np.random.default_rng(1))
-    write_clip(tmp_path / "video.mkv", (Frame(picture, k, 0.04 * k) for k in range(3)), Ffv1())
+    write_clip(tmp_path / "video.mkv", (Frame(picture, k, 0.04 * k) for k in range(3)), FFV1)
     return tmp_path / "video.mkv"
 
 

@@ -1,10 +1,8 @@
 """Jumps in a coded recording: real steps are accepted, jumps due to a damaged stream are not."""
 
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
 
@@ -14,6 +12,7 @@ from fingervision.frames.source import open_source
 from fingervision.measuring.sound_picture import SoundPictures, foreign_corners
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
+from tests.clips import Codec, coded
 
 SETTINGS = Settings(6.0)
 SIZE_PX, COUNT = (320, 240), 12
@@ -141,13 +140,6 @@ def test_a_lossless_picture_is_believed_whatever_it_shows() -> None:
 def test_sound_films_pass_however_coarse(tmp_path: Path, coder: str, options: dict[str, str]) -> None:
     path = tmp_path / "clip.mkv"
     kind = "yuv420p" if coder == "libx264" else "yuvj420p"
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(coder, rate=25, options=options)
-        stream.width, stream.height, stream.pix_fmt = *SIZE_PX, kind
-        for k in range(24):
-            levels = picture(50.0 + 0.3 * k + 16.0 * (k // 5 % 2), k, blur_px=0.5)
-            frame = av.VideoFrame.from_ndarray(levels, format="gray").reformat(format=kind, dst_color_range="JPEG")
-            frame.pts, frame.time_base = k, Fraction(1, 25)
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
+    levels = (picture(50.0 + 0.3 * k + 16.0 * (k // 5 % 2), k, blur_px=0.5) for k in range(24))
+    coded(path, levels, Codec(coder, kind, options), dst_color_range="JPEG")
     assert not [each for each in judged(list(open_source(str(path)))) if isinstance(each, LostFrame)]

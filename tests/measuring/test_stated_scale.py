@@ -17,9 +17,9 @@ from fingervision.live.choices import Choices
 from fingervision.live.playback.track import arguments_of
 from fingervision.measuring.scale import stated_scale
 from fingervision.rendering import Camera, render, two_fingers
-from fingervision.rendering.clip import Ffv1, write_clip
 from fingervision.storage.calibration_json import read_calibration, write_calibration
 from fingervision.storage.settings_toml import read_settings, write_settings
+from tests.clips import FFV1, write_clip
 
 PX_PER_MM, U_PX_PER_MM = 20.0, 0.3
 SIZE_PX = (240, 200)
@@ -32,7 +32,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("clip") / "clip.mkv"
     rng = np.random.default_rng(0)
     scenes = [two_fingers(60.0 + k, below_tip_px=6.0, width_px=40.0, frame=SIZE_PX) for k in range(2)]
-    write_clip(path, (Frame(render(each, Camera(), rng), k, 0.04 * k) for k, each in enumerate(scenes)), Ffv1())
+    write_clip(path, (Frame(render(each, Camera(), rng), k, 0.04 * k) for k, each in enumerate(scenes)), FFV1)
     return path
 
 

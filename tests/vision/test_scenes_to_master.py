@@ -1,5 +1,6 @@
 """Every scene gives its true gap within a tenth of a pixel, or within four stated uncertainties."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -20,7 +21,6 @@ from fingervision.rendering import (
     truth,
     two_fingers,
 )
-from fingervision.rendering.clip import through_jpeg
 from fingervision.rendering.outline import Motion
 from fingervision.rendering.polygon import polygon
 from fingervision.vision.pipeline import Settings, measure_frame
@@ -83,7 +83,8 @@ def test_a_scene_gives_its_gap(name: str) -> None:
     assert isinstance(true, TrueGap)
     pixels = render(scene, camera, np.random.default_rng([93, len(name)]))
     if quality is not None:
-        pixels = through_jpeg(pixels, quality)
+        packet = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+        pixels = np.asarray(cv2.imdecode(packet, cv2.IMREAD_GRAYSCALE))
     coding = Coding.LOSSLESS if quality is None else Coding.INTRAFRAME
     found = measure_frame(Frame(pixels, 0, coding=coding), Settings(below_tip_px))
     assert isinstance(found, GapMeasurement), found
