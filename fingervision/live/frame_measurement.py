@@ -15,6 +15,7 @@ from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.task import Task
 from fingervision.storage.gaps_csv import GapRow
+from fingervision.vision.defect_pixels import repaired
 from fingervision.vision.pipeline import Settings, measure_frame
 
 # The camera of a live view, learnt while frames arrive: assumed at first, known after a dozen frames with a gap.
@@ -168,6 +169,7 @@ class FrameMeasurement:
         if self._fingers_are_dark is not None:
             settings = replace(settings, fingers_are_dark=self._fingers_are_dark)
         self.settings = settings
+        frame = repaired(frame, settings.camera)
         outcome = self._pictures.judged(frame, measure_frame(frame, settings))
         if isinstance(outcome, GapMeasurement) and run is None:
             self._camera.add(frame, settings, choices.task)

@@ -6,11 +6,12 @@ from itertools import chain
 
 from calib.calibration import is_stated
 from calib.measured_scale import Calibration
-from fingervision.domain.camera import CameraModel
+from fingervision.domain.camera import CameraModel, Origin
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.temporal_filter import temporal_lag
+from fingervision.vision.defect_pixels import blanked, defect_pixels
 from fingervision.vision.flank_profiles import Seen
 from fingervision.vision.grey import to_grey, top_level
 from fingervision.vision.learnt_camera import MODEL_ERROR, learnt_camera
@@ -74,13 +75,14 @@ def learnt_first(
 
 def camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) -> CameraModel:
     """Camera as frames of one recording show it; the camera before if too few of them have a gap."""
+    settings = replace(settings, camera=with_defects(settings.camera, frames, settings.bits))
     before = settings.camera
     looks = [(frame, look) for frame in frames if (look := _steps_alone(frame, settings)) is not None]
     if len(looks) < FEWEST:
         return before
     seen = [each for _, (each, _) in looks]
     first, are_dark = looks[0][0], all(is_dark for _, (_, is_dark) in looks)
-    coding, top = first.coding, max(top_level(upright, settings.bits) for upright, _ in seen)
+    coding, top = first.coding, max(top_level(to_grey(frame.pixels), settings.bits) for frame, _ in looks)
     camera = learnt_camera(seen, before, top, coding, are_dark=are_dark)
     if coding is not Coding.INTERFRAME:  # such a codec repeats the noise of the picture before
         lag = temporal_lag([(frame.index, *each) for frame, (each, _) in looks])
@@ -101,8 +103,17 @@ def _steps_alone(frame: Frame, settings: Settings) -> tuple[Seen, bool] | None:
     outcome, fingers, edges = look_closely(frame, settings, only_steps=True)
     if not isinstance(outcome, GapMeasurement) or fingers is None or edges is None:
         return None
-    grey = region_of_interest(to_grey(frame.pixels), settings.region)
+    grey = region_of_interest(blanked(to_grey(frame.pixels), settings.camera.defects), settings.region)
     return (fingers.orientation.view(grey), edges), outcome.light_gap
+
+
+def with_defects(camera: CameraModel, frames: Sequence[Frame], bits: int | None) -> CameraModel:
+    """Camera with the defect pixels that stand still in some frames; the camera before if there are too few frames."""
+    if len(frames) < FEWEST or len({frame.pixels.shape for frame in frames}) > 1:
+        return camera
+    pictures = [to_grey(frame.pixels) for frame in frames]
+    found = defect_pixels(pictures, max(top_level(picture, bits) for picture in pictures))
+    return replace(camera, defects=found, defects_origin=Origin.LEARNT)
 
 
 def _has_edge_bias(scale: Scale | None) -> bool:

@@ -30,6 +30,7 @@ from fingervision.measuring.temporal_filter import with_lag
 from fingervision.storage.beside import recorded_camera
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.lost_frames import lost_frames
+from fingervision.vision.defect_pixels import repaired
 from fingervision.vision.pipeline import Settings, measure_frame
 
 # Determine once per recording whether the fingers are darker or lighter than the background.
@@ -286,7 +287,8 @@ def _outcomes(
         first, series.camera = learnt_first(
             coded(frames, how.description.coding), how.settings, how.row_maker.scale, is_stopped
         )
-        yield from with_lag(confirmed_beside_damage(in_sequence(judged(first))), series.camera.lag)
+        seen = (repaired(item, series.camera) if isinstance(item, Frame) else item for item in first)
+        yield from with_lag(confirmed_beside_damage(in_sequence(judged(seen))), series.camera.lag)
 
 
 def coded(frames: Iterable[Frame | LostFrame], coding: Coding) -> Iterator[Frame | LostFrame]:

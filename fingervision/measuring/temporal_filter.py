@@ -44,13 +44,14 @@ def temporal_lag(seen: Sequence[tuple[int, NDArray[np.generic], EdgePoints]]) ->
     Parameters
     ----------
     seen : sequence of (int, ndarray, EdgePoints)
-        Number of each frame, its picture turned so that the tips point up, and the edges fitted in it.
+        Number of each frame, its picture turned so that the tips point up (NaN at defect pixels), and the edges fitted
+        in it.
     """
     same = [each for each in seen if each[1].shape == seen[0][1].shape]
     ground = _ground([edges for _, _, edges in same])
     if ground is None:
         return UNKNOWN
-    pictures = {index: picture[ground].astype(np.float64) for index, picture, _ in same}
+    pictures = {index: np.nan_to_num(picture[ground].astype(np.float64)) for index, picture, _ in same}
     apart = {
         index: difference - cv2.GaussianBlur(difference, (0, 0), SMOOTH_PX)
         for index, picture in pictures.items()

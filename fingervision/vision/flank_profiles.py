@@ -21,7 +21,9 @@ STRAIGHT_PX, FEWEST_ROWS = 0.4, 6
 # clipped.
 LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
 
-Seen = tuple[GreyImage, EdgePoints]
+# A picture (NaN where the sensor is defective) and the edges in it.
+Levels = GreyImage | NDArray[np.float32]
+Seen = tuple[Levels, EdgePoints]
 
 
 def flank_profiles(seen: Sequence[Seen], top_level: int, extra_px: float = REACH_EXTRA_PX) -> list[EdgeProfile]:
@@ -69,9 +71,7 @@ def flank_profile(
     return binned_profile(away, level, frame, 1.0 / top_level, outward, is_outer=not is_inner)
 
 
-def _one(
-    upright: GreyImage, edges: EdgePoints, finger: int, part: slice, extra_px: float
-) -> tuple[Floats, Floats] | None:
+def _one(upright: Levels, edges: EdgePoints, finger: int, part: slice, extra_px: float) -> tuple[Floats, Floats] | None:
     """Distances outwards from the flank's line, and stored levels, of one picture."""
     real = np.flatnonzero(edges.lines.weight[finger, part] > 0)
     rows = real[real.size // 2 :]
@@ -97,12 +97,13 @@ def _one(
         return None
     columns = np.rint(line).astype(int)[:, None] + outward * np.arange(-reach, reach + 1)
     inside = (columns >= 0) & (columns < upright.shape[1])
-    levels = upright[np.broadcast_to(every[:, None], columns.shape)[inside], columns[inside]]
+    levels = upright[np.broadcast_to(every[:, None], columns.shape)[inside], columns[inside]].astype(np.float64)
+    is_known = np.isfinite(levels)
     cosine = float(1.0 / np.hypot(1.0, slope))
-    return (outward * (columns - line[:, None]) * cosine)[inside], levels.astype(np.float64)
+    return (outward * (columns - line[:, None]) * cosine)[inside][is_known], levels[is_known]
 
 
-def _room_px(upright: GreyImage, edges: EdgePoints, line: Floats) -> float:
+def _room_px(upright: Levels, edges: EdgePoints, line: Floats) -> float:
     """Half of the smallest distance from the middle of a flank to another flank."""
     middle = float(np.median(line))
     room = float(FARTHEST_PX)

@@ -6,13 +6,13 @@ mirrored recording gives the same numbers.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.direction import Direction
-from fingervision.vision.grey import GreyImage
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Orientation:
         """Whether the axis along the fingers runs opposite to the picture's axis."""
         return self.direction in (Direction.DOWN, Direction.RIGHT)
 
-    def view(self, image: GreyImage) -> GreyImage:
+    def view(self, image: NDArray[Any]) -> NDArray[Any]:
         """View of the picture as if the tips pointed up: the row index counts along the fingers, from the tips."""
         upright = image if self.direction.is_vertical else image.T
         return upright[::-1] if self.is_flipped else upright

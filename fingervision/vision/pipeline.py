@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import isnan, sqrt
+from typing import Any
 
 import cv2
 import numpy as np
@@ -22,6 +23,7 @@ from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges, local_change
 from fingervision.vision.coded_picture import CodedPicture, coded_picture
+from fingervision.vision.defect_pixels import repaired
 from fingervision.vision.edge_moves import STEPS_ALONE, moved_by_recording
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
@@ -40,7 +42,15 @@ from fingervision.vision.settings import LINEAR_CAMERA, Settings
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
-__all__ = ["LINEAR_CAMERA", "Settings", "look_closely", "measure_frame", "region_of_interest", "steps"]
+__all__ = [
+    "LINEAR_CAMERA",
+    "Settings",
+    "look_closely",
+    "measure_frame",
+    "measured_levels",
+    "region_of_interest",
+    "steps",
+]
 
 # Least contrast between the two classes of a picture, as a share of full scale.
 CONTRAST_FLOOR = 0.03
@@ -77,7 +87,7 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     if cv2.getNumThreads() != 1:
         cv2.setNumThreads(1)
     keep_picture_memory()
-    grey = region_of_interest(to_grey(frame.pixels), settings.region)
+    grey = measured_levels(frame, settings)
     return _shifted(_attempt(grey, settings, coded_picture(frame, settings)).outcome, settings.region)
 
 
@@ -106,9 +116,7 @@ def look_closely(
     """
     if only_steps:
         settings = replace(settings, camera=replace(settings.camera, beside=STEPS_ALONE))
-    attempt = _attempt(
-        region_of_interest(to_grey(frame.pixels), settings.region), settings, coded_picture(frame, settings)
-    )
+    attempt = _attempt(measured_levels(frame, settings), settings, coded_picture(frame, settings))
     return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
 
 
@@ -127,7 +135,7 @@ def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     list of (str, ndarray of uint8)
         Name and picture of each step: grey, denoised, binary, boundary, edges, and the measured gap.
     """
-    grey = region_of_interest(to_grey(frame.pixels), settings.region)
+    grey = measured_levels(frame, settings)
     denoised = denoise(grey)
     attempt = _attempt(grey, settings, coded_picture(frame, settings))
     own = Frame(in_eight_bits(grey), frame.index)
@@ -143,7 +151,12 @@ def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     ]
 
 
-def region_of_interest(grey: GreyImage, region: Region | None) -> GreyImage:
+def measured_levels(frame: Frame, settings: Settings) -> GreyImage:
+    """Grey levels of the part of a frame that is measured, without the camera's defect pixels."""
+    return region_of_interest(to_grey(repaired(frame, settings.camera).pixels), settings.region)
+
+
+def region_of_interest(grey: NDArray[Any], region: Region | None) -> NDArray[Any]:
     """Part of a picture that is measured."""
     if region is None:
         return grey

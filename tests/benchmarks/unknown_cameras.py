@@ -99,7 +99,7 @@ class Film:
 
     @property
     def description(self) -> Description:
-        height, width = self.pictures[0].shape
+        height, width = self.pictures[0].shape[:2]
         return Description("drawn", "images", "raw", self.coding, width, height, 25.0, True, len(self.pictures))
 
     def __iter__(self) -> Iterator[Frame]:
