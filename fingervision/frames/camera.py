@@ -11,7 +11,6 @@ from threading import Event
 from time import monotonic
 from typing import Any
 
-import av
 import cv2
 
 from fingervision.domain.errors import DeviceError
@@ -34,7 +33,7 @@ from fingervision.frames.camera_settings import (
     settled,
 )
 from fingervision.frames.controls import FRAME_RATE, CameraControl
-from fingervision.frames.received import Received
+from fingervision.frames.received import Endable, Received
 from fingervision.frames.source import Description, Wish
 
 # Limits of a V4L2 camera's settings, as stated by the driver (Linux).
@@ -191,7 +190,7 @@ def found_cameras() -> list[tuple[str, str]]:
     return found
 
 
-class CameraFrames:
+class CameraFrames(Endable):
     """An open camera.
 
     Grey levels are the camera's luma. Time stamps are the driver's, where it gives any (V4L2: the beginning of the
@@ -204,8 +203,6 @@ class CameraFrames:
     wish : Wish
         Requested settings of the camera.
     """
-
-    template: av.VideoStream | None = None
 
     def __init__(self, name: str, wish: Wish) -> None:
         self.name = name
@@ -234,11 +231,6 @@ class CameraFrames:
         self._ranges = ranges(name) if self._capture.getBackendName() == V4L2 else {}
         self.description = self._described(wish, (pixels.shape[1], pixels.shape[0]))
 
-    def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Yield the frames as they arrive."""
-        for received in self.received():
-            yield received.item
-
     def received(self) -> Iterator[Received]:
         """Yield the frames as they arrive, until the camera is closed or unplugged."""
         failed, last_s = 0, 0.0
@@ -263,10 +255,6 @@ class CameraFrames:
                 yield Received(item, arrived_s)
         finally:
             self._capture.release()
-
-    def close(self) -> None:
-        """End the iteration over the frames with the next frame."""
-        self._closed.set()
 
     def controls(self) -> tuple[CameraControl, ...]:
         """Settings that may be changed while the camera runs, with their values and limits."""

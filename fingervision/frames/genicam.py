@@ -14,7 +14,6 @@ from threading import Event
 from time import monotonic
 from typing import Any
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,7 +21,7 @@ from fingervision.domain.errors import DeviceError, InputFileError, MissingLibra
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
 from fingervision.domain.status import Status
 from fingervision.frames.controls import EXPOSURE, FRAME_RATE, GAIN, CameraControl
-from fingervision.frames.received import Received
+from fingervision.frames.received import Endable, Received
 from fingervision.frames.source import Description, Wish
 
 # Features of a GenICam camera: requested at the start, stated by the camera, or changeable while the camera runs.
@@ -157,7 +156,7 @@ def open_frames(name: str, wish: Wish) -> "GenicamFrames":
     return GenicamFrames(name, wish)
 
 
-class GenicamFrames:
+class GenicamFrames(Endable):
     """An open GenICam camera.
 
     Time stamps are the camera's own if it sends them, else those of the computer's clock on arrival.
@@ -169,8 +168,6 @@ class GenicamFrames:
     wish : Wish
         Requested size, frame rate, exposure (ms) and gain.
     """
-
-    template: av.VideoStream | None = None
 
     def __init__(self, name: str, wish: Wish) -> None:
         self.name = name
@@ -209,11 +206,6 @@ class GenicamFrames:
         )
         first.queue()
 
-    def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Yield the frames as they arrive."""
-        for received in self.received():
-            yield received.item
-
     def received(self) -> Iterator[Received]:
         """Yield the frames as they arrive, until the camera is closed or unplugged.
 
@@ -235,10 +227,6 @@ class GenicamFrames:
                 yield Received(item, arrived_s)
         finally:
             self._release()
-
-    def close(self) -> None:
-        """End the iteration over the frames with the next frame."""
-        self._closed.set()
 
     def controls(self) -> tuple[CameraControl, ...]:
         """Settings that may be changed while the camera runs, with their values and limits."""

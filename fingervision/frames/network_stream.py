@@ -17,7 +17,7 @@ from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.luma import luma
 from fingervision.frames.open_container import WHATEVER_METADATA
 from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
-from fingervision.frames.received import OwnPacket, Received
+from fingervision.frames.received import Endable, OwnPacket, Received
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.source import Description, Wish
 from fingervision.frames.spoken_damage import STRICT, Heard, listening
@@ -71,7 +71,7 @@ def open_frames(name: str, wish: Wish) -> "NetworkStream":
     return NetworkStream(name)
 
 
-class NetworkStream:
+class NetworkStream(Endable):
     """A connected stream; after an interruption, a new object is opened.
 
     Time stamps are those of the stream (RTSP, MPEG-TS), or else of the computer's clock on arrival: a sequence of JPEG
@@ -107,7 +107,7 @@ class NetworkStream:
         # camera's container is closed. They are copied as parameters, because some decoders have no encoder of the same
         # name (AV1).
         self._kept = av.open(io.BytesIO(), "w", format="matroska")
-        self.template: av.VideoStream | None = self._kept.add_stream_from_template(self._stream, opaque=True)
+        self.template = self._kept.add_stream_from_template(self._stream, opaque=True)
         codec = self._stream.codec_context
         codec.options = STRICT | EXPORTED
         DamageTrail.prepare(codec)
@@ -137,11 +137,6 @@ class NetworkStream:
             frame_count=None,
         )
 
-    def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Yield the frames as they arrive; an interruption raises an error."""
-        for received in self.received():
-            yield received.item
-
     def received(self) -> Iterator[Received]:
         """Yield the frames with the packets in which they arrived."""
         numbers, trail = count(), DamageTrail()
@@ -170,10 +165,6 @@ class NetworkStream:
                         del waiting[:arrived]
         finally:
             self._container.close()
-
-    def close(self) -> None:
-        """End the iteration with the next packet, or after the time limit for it."""
-        self._closed.set()
 
     def _packets(self) -> Iterator[tuple[Any, float]]:
         demuxed = self._container.demux(self._stream)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from threading import Event
 from typing import Protocol
 
 import av
@@ -102,3 +103,23 @@ class LiveSource(Protocol):
     def close(self) -> None:
         """Close the camera or connection, which ends the iteration."""
         ...
+
+
+class Endable:
+    """Base of sources whose frames come until they are closed."""
+
+    template: av.VideoStream | None = None
+    _closed: Event
+
+    def __iter__(self) -> Iterator[Frame | LostFrame]:
+        """Yield the frames as they arrive."""
+        for received in self.received():
+            yield received.item
+
+    def received(self) -> Iterator[Received]:
+        """Yield the frames as they arrive, until the source is closed."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """End the iteration with the next frame, or after the time limit for it."""
+        self._closed.set()

@@ -6,12 +6,11 @@ from math import cos, pi
 from threading import Event
 from time import monotonic
 
-import av
 import numpy as np
 
 from fingervision.domain.errors import UsageError
-from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
-from fingervision.frames.received import Received
+from fingervision.domain.frame import Coding, Frame, Pixels
+from fingervision.frames.received import Endable, Received
 from fingervision.frames.source import Description, Wish
 
 NAME = "simulated"
@@ -49,7 +48,7 @@ def true_gap_mm(index: int) -> float:
     return CLOSED_MM + (OPEN_MM - CLOSED_MM) * 0.5 * (1.0 - cos(2.0 * pi * (index % CYCLE_FRAMES) / CYCLE_FRAMES))
 
 
-class SimulatedGripper:
+class SimulatedGripper(Endable):
     """A simulated camera; frames come at its frame rate, with exact times.
 
     Parameters
@@ -61,7 +60,6 @@ class SimulatedGripper:
     """
 
     has_own_clock = True
-    template: av.VideoStream | None = None
     px_per_mm = PX_PER_MM
 
     def __init__(self, size_px: tuple[int, int], rate_hz: float) -> None:
@@ -85,11 +83,6 @@ class SimulatedGripper:
             frame_count=None,
         )
 
-    def __iter__(self) -> Iterator[Frame | LostFrame]:
-        """Yield the frames in real time."""
-        for received in self.received():
-            yield received.item
-
     def received(self) -> Iterator[Received]:
         """Yield the frames in real time, until the camera is closed."""
         rng = np.random.default_rng(SEED)
@@ -105,10 +98,6 @@ class SimulatedGripper:
             if self._closed.wait(max(0.0, started_s + time_s - monotonic())):
                 return
             yield Received(Frame(drawn[place], index, time_s), monotonic())
-
-    def close(self) -> None:
-        """End the iteration."""
-        self._closed.set()
 
     def _drawn(self, place: int, rng: np.random.Generator) -> Pixels:
         # Imported here, because the import takes a third of a second.

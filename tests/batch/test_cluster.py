@@ -3,7 +3,6 @@
 import csv
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -16,6 +15,7 @@ pytest.importorskip("distributed", reason="Dask is not installed: pip install -e
 
 from fingervision.batch import cluster as cluster_module
 from fingervision.domain.errors import FingervisionError
+from tests.waiting import free_port
 
 ROOT = Path(__file__).parents[2]
 # Starting Python, Dask and our imports on a busy machine; nothing is measured by it.
@@ -27,12 +27,6 @@ ENVIRONMENT = {
     # Workers are called dead soon enough for a test.
     "DASK_DISTRIBUTED__DEPLOY__LOST_WORKER_TIMEOUT": "1s",
 }
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def started(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":

@@ -1,4 +1,4 @@
-"""What people and shells hand over: odd names, pipes, closed streams, links in circles; a sentence or the result."""
+"""What people and shells hand over: odd names and closed streams; a sentence or the result."""
 
 import os
 import shutil
@@ -79,33 +79,3 @@ def test_a_full_output_is_a_sentence(tmp_path: Path, clip: Path) -> None:
     assert done.returncode == 1
     assert b"Standard output could not be written" in done.stderr
     assert (tmp_path / "out" / "summary.json").exists()
-
-
-def said(folder: Path, *arguments: str) -> str:
-    done = run(folder, *arguments)
-    assert done.returncode in (1, 2), done.stdout
-    return done.stderr.decode()
-
-
-@pytest.mark.slow
-def test_what_is_no_recording_is_a_sentence(tmp_path: Path, clip: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.mp4")
-    (tmp_path / "loop").symlink_to("loop")
-    assert "is a pipe or a device" in said(tmp_path, "measure", "pipe.mp4", *SCALE)
-    assert "must not be empty, but argument" in said(tmp_path, "measure", "", *SCALE)
-    assert "is a camera, which does not" in said(tmp_path, "measure", "simulated", *SCALE)
-    assert "fingervision: " in said(tmp_path, "measure", "loop", *SCALE)
-    assert "ends before frame 7" in said(tmp_path, "measure", str(clip), *SCALE, "--frames", "7:9")
-
-
-@pytest.mark.slow
-def test_what_is_no_table_is_a_sentence(tmp_path: Path, clip: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.csv")
-    (tmp_path / "loop").symlink_to("loop")
-    (tmp_path / "drive.csv").write_text("time_s,input_mm\n100,0\n101,1\n")
-    (tmp_path / "quote.csv").write_text('time_s,input_mm,run\n0,0,"a\n1,1,a\n')
-    measure = ("measure", str(clip), *SCALE, "--drive-offset-s", "0", "--drive")
-    assert "is a folder or a pipe" in said(tmp_path, *measure, "pipe.csv")
-    assert "No frame lies within the drive's times (100 to 101 s" in said(tmp_path, *measure, "drive.csv")
-    assert "quote" in said(tmp_path, *measure, "quote.csv")
-    assert "loop" in said(tmp_path, "measure", str(clip), *SCALE, "--out", "loop")

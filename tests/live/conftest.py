@@ -11,16 +11,26 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import cos, pi
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
+from calib.calibration import BareScale
+from fingervision.frames.source import Wish
+from fingervision.live.choices import Choices
+from fingervision.live.opening import opened
+from fingervision.live.playback.playback import Playback
+from fingervision.live.server import Page, bound
+from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
+from tests.waiting import free_port
 
 # It is for the system's Python.
 collect_ignore = ["rtsp_server.py"]
@@ -99,12 +109,6 @@ class NetworkCamera:
         if self.process is not None:
             self.process.kill()
             self.process.wait()
-
-
-def free_port() -> int:
-    with socket.socket() as listening:
-        listening.bind(("127.0.0.1", 0))
-        return int(listening.getsockname()[1])
 
 
 def is_listened_at(port: int) -> bool:
@@ -200,3 +204,26 @@ def measured(tmp_path: Path) -> Callable[..., str]:
         return (out / "gaps.csv").read_text()
 
     return measure
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Session:
+    return Session(opened("simulated", Wish()), Choices(scale=BareScale(PX_PER_MM)), tmp_path)
+
+
+@pytest.fixture
+def page(session: Session) -> Iterator[Page]:
+    with serving(session) as found:
+        yield found
+
+
+@contextmanager
+def serving(view: Session | Playback) -> Iterator[Page]:
+    found, ending = Page(view, bound("127.0.0.1", 0)), Event()
+    thread = Thread(target=found.serve, args=(ending,))
+    thread.start()
+    try:
+        yield found
+    finally:
+        ending.set()
+        thread.join()

@@ -15,6 +15,8 @@ from typing import Any
 import pytest
 from websockets.sync.client import connect
 
+from tests.waiting import until
+
 FIREFOX = shutil.which("firefox-esr") or shutil.which("firefox")
 needs_firefox = pytest.mark.skipif(FIREFOX is None, reason="Firefox is not installed: the page is tested in it.")
 START_S, ANSWER_S, PATIENCE_S = 120.0, 120.0, 120.0
@@ -100,10 +102,7 @@ class Firefox:
 
     def shown(self, words: str) -> None:
         """Wait until an expression is true."""
-        end_s = time.monotonic() + PATIENCE_S
-        while not self.evaluate(f"Boolean({words})"):
-            assert time.monotonic() < end_s, f"not true in time: {words}"
-            time.sleep(0.05)
+        until(lambda: self.evaluate(f"Boolean({words})"), lambda: f"not true in time: {words}", PATIENCE_S)
 
     def press(self, keys: str) -> None:
         """Type into the focused element."""

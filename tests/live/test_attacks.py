@@ -3,7 +3,6 @@
 import json
 import re
 import struct
-import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -25,6 +24,7 @@ from fingervision.live.opening import opened as opened_source
 from fingervision.live.server import PAGE, Page, bound, files, index, kept_token
 from fingervision.live.session import Session
 from tests.live.browser import browser, needs_chromium, opened, shown
+from tests.waiting import until
 
 __all__ = ["browser", "opened"]
 BRIEF_VISITS = 24
@@ -35,17 +35,6 @@ def session(tmp_path: Path) -> Iterator[Session]:
     found = Session(opened_source("simulated", Wish()), Choices(scale=BareScale(34.0)), tmp_path)
     yield found
     found.capture.stop()
-
-
-@pytest.fixture
-def page(session: Session) -> Iterator[Page]:
-    ending = Event()
-    found = Page(session, bound("127.0.0.1", 0))
-    thread = Thread(target=found.serve, args=(ending,))
-    thread.start()
-    yield found
-    ending.set()
-    thread.join()
 
 
 def status(address: str, **headers: str) -> int:
@@ -192,10 +181,7 @@ def test_viewers_who_stay_a_millisecond_leave_nothing_behind(page: Page, session
             with create_connection(("127.0.0.1", port), timeout=10.0) as half:
                 half.sendall(b"GET /socket?token=x HTTP/1.1\r\nHost: "[: 5 + number % 30])
                 half.setsockopt(SOL_SOCKET, SO_LINGER, struct.pack("ii", 1, 0))
-        end_s = time.monotonic() + 10.0
-        while len(page._sockets) > 1:
-            assert time.monotonic() < end_s, "sockets of viewers who have gone are kept"
-            time.sleep(0.02)
+        until(lambda: len(page._sockets) <= 1, lambda: "sockets of viewers who have gone are kept", within_s=10.0)
         # Who worked the view still does, and is told nothing of them.
         assert "refused" not in reply(quiet, {"do": "height", "below_tip_mm": 0.3})
     assert [each.words for each in session.messages][said:] == []
@@ -267,9 +253,7 @@ def test_one_page_writes_until_another_takes_over(page: Page, session: Session) 
         assert "Take over" in reply(first, {"do": "scale", "px_per_mm": 30.0})["refused"]
         assert session.choices.scale == BareScale(20.0)
         second.close()
-        end_s = time.monotonic() + 10.0
-        while "refused" in reply(first, {"do": "scale", "px_per_mm": 40.0}):
-            assert time.monotonic() < end_s
+        until(lambda: "refused" not in reply(first, {"do": "scale", "px_per_mm": 40.0}), within_s=10.0)
 
 
 def test_the_page_has_no_script_of_its_own_and_the_policy_lets_none_in() -> None:

@@ -1,6 +1,5 @@
 """Control of the test bed from the page: limits as in the command, stop by any user, motion only with permission."""
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from threading import Thread
@@ -22,10 +21,11 @@ from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.bed_factory import open_bed
 from tests.live.browser import browser, needs_chromium, opened, says, shown
+from tests.waiting import until
 
 __all__ = ["browser", "opened"]
 # A bed that goes faster than time, so that nobody waits.
-PACE, PATIENCE_S = 20.0, 60.0
+PACE = 20.0
 RECIPE = """schema = 1
 name = "there and back"
 below_force_n = 5.0
@@ -57,13 +57,6 @@ def session(bench: Bench, tmp_path: Path) -> Session:
     found.features |= {"bed": bench, "allow_motion": True}
     bench.say = found.say
     return found
-
-
-def until(true: Callable[[], Any]) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while not true():
-        assert time.monotonic() < end_s
-        time.sleep(0.01)
 
 
 def done(session: Session, bench: Bench, request: dict[str, Any]) -> str:

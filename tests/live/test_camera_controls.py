@@ -28,10 +28,9 @@ from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from tests.live.browser import browser, needs_chromium, opened, shown
 from tests.live.test_wrong_fields import TWENTY
+from tests.waiting import until
 
 __all__ = ["browser", "opened"]
-
-PATIENCE_S = 30.0
 
 
 @cache
@@ -119,13 +118,6 @@ def session(tmp_path: Path, cameras: list[PluginCamera]) -> Iterator[Session]:
     until(lambda: found.history.count > 3)
     yield found
     found.stop()
-
-
-def until(condition: object) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while not condition():  # type: ignore[operator]
-        assert time.monotonic() < end_s
-        time.sleep(0.01)
 
 
 def put(session: Session, name: str, value: object) -> str:

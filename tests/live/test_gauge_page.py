@@ -4,7 +4,6 @@ import csv
 import json
 import subprocess
 import sys
-import time
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -29,6 +28,7 @@ from fingervision.live.playback.recorded import recorded
 from tests.gauges.drawn import bar, drawn, half_plane, seen
 from tests.live.browser import browser, needs_chromium, opened, says, shown
 from tests.live.test_page_layout import findings
+from tests.waiting import until
 
 __all__ = ["browser", "opened"]
 
@@ -252,10 +252,7 @@ def test_readings_are_those_of_measure(opened_on: Opened, frames: Path, tmp_path
     with (out / "gauges.csv").open(encoding="utf-8", newline="") as file:
         rows = [list(row.values())[1:] for row in csv.DictReader(file)]
     obey(view, {"do": "seek", "frame": FRAMES - 1})
-    until = time.monotonic() + 60.0
-    while beside.following.frames < FRAMES:
-        assert time.monotonic() < until, beside.following.trouble
-        time.sleep(0.05)
+    until(lambda: beside.following.frames >= FRAMES, lambda: beside.following.trouble)
     found = []
     for frame in range(FRAMES):
         readings = beside.following.readings(frame, beside.board.version)

@@ -3,13 +3,12 @@
 import socket
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from itertools import count, groupby, pairwise
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
-from typing import Any
 
 import cv2
 import numpy as np
@@ -30,6 +29,7 @@ from fingervision.live.session import Session
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
+from tests.waiting import until
 
 SIZE_PX, SCALE = (160, 120), BareScale(17.0)
 WITHIN_S = 120.0
@@ -39,13 +39,6 @@ PICTURES = 20
 def picture(gap_px: float = 60.0, seed: int = 0) -> np.ndarray:
     scene = two_fingers(gap_px, below_tip_px=5.1, width_px=25.0, frame=SIZE_PX)
     return np.asarray(render(scene, Camera(noise_grey=1.0), np.random.default_rng(seed)))
-
-
-def until(found: Callable[[], Any]) -> None:
-    end_s = monotonic() + WITHIN_S
-    while not found():
-        assert monotonic() < end_s
-        time.sleep(0.02)
 
 
 class CutCamera:

@@ -6,7 +6,7 @@ import shutil
 import struct
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from threading import Event, Thread
 from types import SimpleNamespace
@@ -27,7 +27,6 @@ from fingervision.live import page_socket, server
 from fingervision.live import recorder as recorder_module
 from fingervision.live.cadence import Cadence
 from fingervision.live.capture import OverflowReport
-from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.opening import opened
 from fingervision.live.preview import Known, message, state_has_changed
@@ -36,13 +35,9 @@ from fingervision.live.running import PATIENCE_S, JsonLines, Outlet
 from fingervision.live.session import Session
 from fingervision.live.supervisor import Supervisor
 from fingervision.storage.gaps_csv import GapRow
+from tests.waiting import until
 
 HAMMERED_S = 0.5
-
-
-@pytest.fixture
-def session(tmp_path: Path) -> Session:
-    return Session(opened("simulated", Wish()), Choices(scale=BareScale(34.0)), tmp_path)
 
 
 def head_of(session: Session) -> dict[str, Any]:
@@ -80,11 +75,8 @@ def test_a_reader_that_pauses_costs_no_frame_of_measurement_or_recording(
     session.on_row.append(JsonLines(outlet).add)
     run = session.record()
     session.start()
-    until_s = time.monotonic() + 60.0
-    while session.history.count < 30 and time.monotonic() < until_s:
-        time.sleep(0.02)
+    until(lambda: session.history.count >= 30)
     session.stop()
-    assert session.history.count >= 30
     assert [int(row["frame"]) for row in rows(run / "gaps.csv")] == list(range(session.history.count))
     stream.goes_on.set()
     outlet.close()
@@ -131,17 +123,6 @@ def test_rate_and_jitter_can_be_asked_for_while_frames_come() -> None:
         ending.set()
         thread.join()
         sys.setswitchinterval(before)
-
-
-@pytest.fixture
-def page(session: Session) -> Iterator[server.Page]:
-    ending = Event()
-    page = server.Page(session, server.bound("127.0.0.1", 0))
-    thread = Thread(target=page.serve, args=(ending,))
-    thread.start()
-    yield page
-    ending.set()
-    thread.join()
 
 
 def closing_code(page: server.Page) -> int | None:
@@ -203,9 +184,7 @@ def test_a_recording_that_failed_is_told_until_the_next_one(session: Session) ->
     assert recorder is not None
     recorder.fail("the disk is full")
     session.start()
-    until_s = time.monotonic() + 30.0
-    while not session.supervisor.trouble and time.monotonic() < until_s:
-        time.sleep(0.02)
+    until(lambda: session.supervisor.trouble)
     assert "the disk is full" in head_of(session)["state"]["trouble"]
     session.record()
     assert head_of(session)["state"]["trouble"] == ""
@@ -218,19 +197,14 @@ def test_a_folder_that_is_taken_away_ends_the_recording_with_a_sentence(
     monkeypatch.setattr(recorder_module, "DISK_EVERY_S", 0.1)
     run = session.record()
     session.start()
-    until_s = time.monotonic() + 30.0
-    while session.history.count < 5 and time.monotonic() < until_s:
-        time.sleep(0.02)
+    until(lambda: session.history.count >= 5)
     away = run.with_name("away")
     run.rename(away)
-    while not session.supervisor.trouble and time.monotonic() < until_s:
-        time.sleep(0.02)
+    until(lambda: session.supervisor.trouble)
     assert str(run) in session.supervisor.trouble
     assert "is gone" in session.supervisor.trouble
     measured = session.history.count
-    while session.history.count < measured + 5 and time.monotonic() < until_s:
-        time.sleep(0.02)
-    assert session.history.count >= measured + 5
+    until(lambda: session.history.count >= measured + 5)
     session.stop()
     # What was written until then is whole.
     assert len((away / "gaps.csv").read_text().splitlines()) >= 5
@@ -252,13 +226,9 @@ def test_frames_that_nobody_measures_hold_up_no_capture_and_are_counted_and_said
     capture = opened("simulated", Wish())
     capture.start(Supervisor(lambda *_: None))
     capture.begin()
-    until_s = (
-        time.monotonic() + 12.0
-    )  # seven frames take 0.3 s; with a wait of 5 s for each there is not time for three
-    while capture.overflowed < 4 and time.monotonic() < until_s:
-        time.sleep(0.02)
+    # Seven frames take 0.3 s; with a wait of 5 s for each there is not time for three.
+    until(lambda: capture.overflowed >= 4, within_s=12.0)
     lost = capture.overflowed
-    assert lost >= 4
     capture.stop()
     lost = capture.overflowed
     said: list[tuple[str, str]] = []

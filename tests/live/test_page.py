@@ -5,7 +5,6 @@ import io
 import json
 import re
 import subprocess
-import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +19,7 @@ import pytest
 from fingervision.live.page_socket import STATE_EVERY_S
 from fingervision.live.session import SILENT_S
 from tests.live.browser import PATIENCE_MS, browser, drag, needs_chromium, opened, says, shown
+from tests.waiting import until
 
 __all__ = ["browser", "opened"]
 pytestmark = needs_chromium
@@ -137,9 +137,7 @@ def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
     assert (under_cursor_s(page, 0.02), under_cursor_s(page, 0.98)) == zoomed_s
     page.locator("body").press("f")
     shown(page, "document.querySelector('#follow').textContent === 'Follow'")
-    end_s = time.monotonic() + PATIENCE_MS / 1e3
-    while under_cursor_s(page, 0.99) <= newest_s:
-        assert time.monotonic() < end_s
+    until(lambda: under_cursor_s(page, 0.99) > newest_s, within_s=PATIENCE_MS / 1e3)
 
     # Where the tips cannot point there is no gap.
     page.select_option("#tips", "left")

@@ -4,7 +4,6 @@ import json
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -25,6 +24,7 @@ from fingervision.live.playback.playback import FrameReader, Playback
 from fingervision.live.playback.recorded import is_recording, recorded
 from fingervision.rendering import Camera, render, two_fingers
 from tests.live.browser import browser, needs_chromium, opened, says, shown
+from tests.waiting import until
 
 __all__ = ["browser", "opened"]
 FRAMES, BITS, CELL_PX = 60, 6, 16
@@ -203,13 +203,6 @@ def test_a_recording_that_is_moved_away_while_it_plays_is_said_and_goes_on_when_
         until(lambda: view.seen is not None and number_in(view.seen.frame.pixels) == 7 and not view.supervisor.trouble)
     finally:
         view.stop()
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < end_s
-        time.sleep(0.01)
 
 
 def frames_of(measured: Path) -> list[int]:

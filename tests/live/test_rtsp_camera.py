@@ -15,7 +15,8 @@ import pytest
 
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.network_stream import NetworkStream
-from tests.live.conftest import CYCLE, START_S, free_port, single_pictures
+from tests.live.conftest import CYCLE, START_S, single_pictures
+from tests.waiting import free_port
 
 SCALE = ("--px-per-mm", "34")
 SYSTEM_PYTHON = "/usr/bin/python3"

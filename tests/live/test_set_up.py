@@ -1,6 +1,5 @@
 """The set-up panel of the page: findings, indicators, measuring height by dragging, polarity, settings."""
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,8 +13,7 @@ from fingervision.live.commands import obey, section
 from fingervision.live.opening import opened
 from fingervision.live.session import Session
 from fingervision.storage.settings_toml import read_settings
-
-PATIENCE_S = 60.0
+from tests.waiting import until
 
 
 @pytest.fixture
@@ -23,9 +21,7 @@ def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session
     monkeypatch.chdir(tmp_path)
     found = Session(opened("simulated", Wish()), Choices(scale=BareScale(34.0)), tmp_path / "out")
     found.start()
-    until_s = time.monotonic() + PATIENCE_S
-    while found.history.count < 3 and time.monotonic() < until_s:
-        time.sleep(0.02)
+    until(lambda: found.history.count >= 3)
     yield found
     found.stop()
 
@@ -35,9 +31,7 @@ def test_the_set_up_is_judged_while_measuring_goes_on(session: Session) -> None:
     obey(session, {"do": "inspect"})
     with pytest.raises(FingervisionError, match="already"):
         obey(session, {"do": "inspect"})
-    until_s = time.monotonic() + PATIENCE_S
-    while section(session)["set_up"]["busy"] and time.monotonic() < until_s:
-        time.sleep(0.05)
+    until(lambda: not section(session)["set_up"]["busy"])
     told = section(session)["set_up"]
     assert told["findings"], told["words"]
     assert {"good", "fair", "poor"} >= {each["severity"] for each in told["findings"]}

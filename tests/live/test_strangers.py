@@ -1,45 +1,23 @@
 """Access by strangers: idle connections, passwords in addresses, endless numbers, the token in other places."""
 
 import socket
-from collections.abc import Iterator
 from pathlib import Path
-from threading import Event, Thread
 from types import SimpleNamespace
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import pytest
 
-from calib.calibration import BareScale
 from fingervision.domain.errors import UsageError
 from fingervision.frames.network_stream import without_password
-from fingervision.frames.source import Wish
 from fingervision.live import guard, server
-from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
-from fingervision.live.opening import opened
 from fingervision.live.page_socket import known_by
 from fingervision.live.preview import Known
 from fingervision.live.session import Session
 
 # More than the server takes connections at once.
 IDLE, OPENED_WITHIN_S = server.CONNECTIONS_AT_ONCE + 12, 10.0
-
-
-@pytest.fixture
-def session(tmp_path: Path) -> Session:
-    return Session(opened("simulated", Wish()), Choices(scale=BareScale(34.0)), tmp_path)
-
-
-@pytest.fixture
-def page(session: Session) -> Iterator[server.Page]:
-    ending = Event()
-    found = server.Page(session, server.bound("127.0.0.1", 0))
-    thread = Thread(target=found.serve, args=(ending,))
-    thread.start()
-    yield found
-    ending.set()
-    thread.join()
 
 
 def status(address: str) -> int:

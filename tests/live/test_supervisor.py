@@ -3,9 +3,8 @@
 import json
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
-from threading import Event, Thread
 from types import SimpleNamespace
 from typing import Any
 
@@ -26,20 +25,15 @@ from fingervision.live.opening import opened as opened_source
 from fingervision.live.page_words import page_json
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
-from fingervision.live.server import Page, bound
+from fingervision.live.server import Page
 from fingervision.live.session import Session
 from fingervision.live.supervisor import Supervisor
 from tests.live.browser import browser, needs_chromium, opened, shown
+from tests.live.conftest import serving
 from tests.live.test_attacks import closing_code, reply, socket_of
+from tests.waiting import until
 
 __all__ = ["browser", "opened"]
-
-
-def until(found: Callable[[], Any], within_s: float = 60.0) -> None:
-    end_s = time.monotonic() + within_s
-    while not found():
-        assert time.monotonic() < end_s
-        time.sleep(0.02)
 
 
 def broken(*_: object) -> Any:
@@ -51,24 +45,6 @@ def session(tmp_path: Path) -> Iterator[Session]:
     found = Session(opened_source("simulated", Wish()), Choices(scale=BareScale(34.0)), tmp_path / "out")
     yield found
     found.stop()
-
-
-@pytest.fixture
-def page(session: Session) -> Iterator[Page]:
-    with serving(session) as found:
-        yield found
-
-
-@contextmanager
-def serving(view: Session | Playback) -> Iterator[Page]:
-    found, ending = Page(view, bound("127.0.0.1", 0)), Event()
-    thread = Thread(target=found.serve, args=(ending,))
-    thread.start()
-    try:
-        yield found
-    finally:
-        ending.set()
-        thread.join()
 
 
 def test_an_error_is_told_once_and_ends_with_the_next_success() -> None:

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError, UsageError
@@ -17,6 +16,7 @@ from fingervision.models.modal_model import frequency_response, modal_motion, re
 from fingervision.models.motion_in_time import gripper_motion
 from fingervision.models.physics import Physics
 from fingervision.storage.mechanism_toml import read_mechanism
+from tests.models.test_mechanism_motion import integrated
 
 HALF_PERCENT, ONE_PERCENT = 0.005, 0.01
 STAGE = Path(__file__).parents[2] / "fingervision" / "models" / "mechanisms" / "parallel_leaf_stage.toml"
@@ -36,22 +36,9 @@ def test_step_response_against_an_adaptive_integration(lumped: LumpedGripper, da
     model = lumped.modal_model(3)
     drive = steps((0.0, 0.0), (0.002, 0.5), (0.03, 0.5))
     found = modal_motion(model, drive, damping)
-    kept, ratios = found.modes_hz.size, found.damping_ratios
-    w, participation = model.rad_s[:kept], model.participation[:kept]
-
-    def slope(_: float, state: np.ndarray) -> np.ndarray:
-        q, v = state.reshape(2, -1)
-        return np.concatenate([v, -2 * ratios * w * v - w**2 * q])
-
-    state, gap = np.zeros(2 * kept), []
-    for (begin, end), jump in (((0.0, 0.002), 250.0), ((0.002, 0.03), -250.0)):
-        state[kept:] -= participation * jump
-        inside = drive.time_s[(drive.time_s >= begin) & (drive.time_s <= end)]
-        way = solve_ivp(slope, (begin, end), state, "DOP853", inside, rtol=1e-10, atol=1e-14)
-        gap.append(way.y[:kept].T if not gap else way.y[:kept].T[1:])
-        state = way.y[:, -1]
+    expected = integrated(model, found.damping_ratios, drive, (0.002, 0.03))
     seen = model.observed["gap_mm"]
-    expected = seen.rest_mm + seen.per_input * drive.input_mm + np.concatenate(gap) @ seen.by_mode[:kept]
+    expected = seen.rest_mm + seen.per_input * drive.input_mm + expected @ seen.by_mode[: found.modes_hz.size]
     vibration = np.ptp(expected - found.static_mm["gap_mm"])
     assert vibration > 0.1
     assert np.abs(found.observed_mm["gap_mm"] - expected).max() < HALF_PERCENT * vibration

@@ -28,6 +28,14 @@ def rectangle(length: float, height: float, along: int, across: int, distort: fl
     return PlaneMesh(np.hstack([flat.p, middles]), triangles)
 
 
+def edge_load(plate: PlaneStressPlate, dofs: np.ndarray, edge: np.ndarray, n_mm: float) -> np.ndarray:
+    """Forces on the nodes by an even load along the upright part of the outline whose nodes are marked."""
+    load, y = np.zeros(plate.unknowns), plate.nodes_mm[1]
+    for a, b, m in plate.outline_edges[:, np.all(edge[plate.outline_edges], axis=0)].T:
+        load[dofs[[a, b, m]]] += n_mm * abs(y[a] - y[b]) * np.array([1, 1, 4]) / 6
+    return load
+
+
 def solve(plate: PlaneStressPlate, held: np.ndarray, values: np.ndarray, load: np.ndarray) -> np.ndarray:
     free = np.setdiff1d(np.arange(plate.unknowns), held)
     moved = np.zeros(plate.unknowns)
@@ -75,11 +83,7 @@ def test_timoshenko_cantilever() -> None:
     x, y = plate.nodes_mm
     inertia, area, shear = PLATE_MM * height**3 / 12, PLATE_MM * height, 500.0
     left, right = x < 1e-9, x > length - 1e-9
-    load = np.zeros(plate.unknowns)
-    edges = plate.outline_edges
-    for a, b, m in edges[:, np.all(right[edges], axis=0)].T:
-        for node, weight in ((a, 1 / 6), (b, 1 / 6), (m, 4 / 6)):
-            load[plate.y_dofs[node]] += force * abs(y[a] - y[b]) * weight / height
+    load = edge_load(plate, plate.y_dofs, right, force / height)
     held = np.concatenate([plate.x_dofs[left], plate.y_dofs[left]])
     moved = solve(plate, held, np.zeros(held.size), load)
     tip = float(moved[plate.y_dofs[right & (np.abs(y - 1.0) < 1e-9)]][0])
@@ -95,12 +99,7 @@ def test_hole_in_a_wide_plate_trebles_the_stress() -> None:
     r = 1.0 + (outer - 1.0) * s
     plate = PlaneStressPlate(PlaneMesh(np.stack([r * np.cos(t), r * np.sin(t)]), mesh.triangles), STEEL, PLATE_MM)
     x, y = plate.nodes_mm
-    load = np.zeros(plate.unknowns)
-    edges = plate.outline_edges
-    right = x > wide - 1e-6
-    for a, b, m in edges[:, np.all(right[edges], axis=0)].T:
-        for node, weight in ((a, 1 / 6), (b, 1 / 6), (m, 4 / 6)):
-            load[plate.x_dofs[node]] += abs(y[a] - y[b]) * PLATE_MM * weight
+    load = edge_load(plate, plate.x_dofs, x > wide - 1e-6, PLATE_MM)
     held = np.concatenate([plate.x_dofs[np.abs(x) < 1e-6], plate.y_dofs[np.abs(y) < 1e-6]])
     stress = plate.von_mises_mpa(solve(plate, held, np.zeros(held.size), load))
     # The factor is that of an infinite plate; a plate of forty radii has 0.2 % more.
@@ -164,12 +163,8 @@ def test_cooks_membrane() -> None:
     place = np.stack([48.0 * s, 44.0 * s + (44.0 - 28.0 * s) * t])
     plate = PlaneStressPlate(PlaneMesh(place, grid.triangles), Material("unit", 1.0, 1.0 / 3.0, 1.0, 1.0), 1.0)
     x, y = plate.nodes_mm
-    load = np.zeros(plate.unknowns)
     end = x > 48.0 - 1e-9
-    edges = plate.outline_edges
-    for a, b, m in edges[:, np.all(end[edges], axis=0)].T:
-        for node, weight in ((a, 1 / 6), (b, 1 / 6), (m, 4 / 6)):
-            load[plate.y_dofs[node]] += abs(y[a] - y[b]) / 16.0 * weight
+    load = edge_load(plate, plate.y_dofs, end, 1.0 / 16.0)
     held = np.concatenate([plate.x_dofs[x < 1e-9], plate.y_dofs[x < 1e-9]])
     moved = solve(plate, held, np.zeros(held.size), load)
     tip = float(moved[plate.y_dofs[end & (np.abs(y - 52.0) < 1e-9)]][0])
