@@ -8,7 +8,7 @@ import numpy as np
 from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_diagnosis import diagnose_with_bodies, without_places
 from fingervision.diagnosis.inference.explanation_candidates import Progress, single_effects
-from fingervision.diagnosis.inference.held_out_prediction import foretold, needed
+from fingervision.diagnosis.inference.held_out_prediction import foretold
 from fingervision.diagnosis.inference.hypothesis import Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.plausibility import mistaken_column, mixed_rows, swapped_directions
@@ -136,10 +136,8 @@ def _beside_drawing(state: Searched, look: Look) -> Searched:
 
 
 def _settled(state: Searched, look: Look) -> Refitted:
-    """Drop unneeded effects, estimate the map and the gains, and compute every parameter's posterior."""
+    """Estimate the map and the gains, and compute every parameter's posterior."""
     data, found = state.data, state.found
-    if not look.forced & set(found.best.names):
-        found = needed(data, found)
     best, posterior = settled_with_records(data, found.problem, found.best, look.rng)
     found = found.with_best(beside_alternatives(found.problem, best, found.alternatives))
     if data.position_map is not None:

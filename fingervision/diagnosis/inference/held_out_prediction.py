@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
@@ -97,34 +97,6 @@ def foretold(data: Observations, found: Findings) -> Findings:
     others = [e for e in found.alternatives if e is not found.best and e.names]
     kept = tuple(e for e in others if fails_on_unseen_half(data, found.problem, e) is None)
     return replace(found, alternatives=(found.best, *kept)) if len(kept) < len(others) else found
-
-
-def needed(data: Observations, found: Findings) -> Findings:
-    """Drop effects without which the unseen halves are foretold as well, if structure remains beside several effects.
-
-    Beside structure that no effect explains, each further effect also fits a part of that structure, whatever it gains;
-    but the structure of one half does not return in the other.
-    """
-    while len(found.best.names) > 1 and (found.unknown is not None or found.left_over is not None):
-        whole_mm = _unseen_rms_mm(data, found.problem, found.best)
-        fewer = [_without(found, name) for name in found.best.names]
-        least_mm, less = min(((_unseen_rms_mm(data, found.problem, e), e) for e in fewer), key=lambda one: one[0])
-        if least_mm > WORSE * whole_mm:
-            break
-        found = replace(found, best=less, alternatives=(less,))
-    return found
-
-
-def _without(found: Findings, name: str) -> Explanation:
-    kept = {other: found.best.values[other] for other in found.best.names if other != name}
-    refit = fit(found.problem, tuple(kept), kept, iterations=MANY_STEPS)
-    return min([refit, *(e for e in found.singles if e.names == refit.names)], key=lambda e: e.score)
-
-
-def _unseen_rms_mm(data: Observations, problem: Problem, explanation: Explanation) -> float:
-    """RMS error (mm) of both halves of the gap, each predicted from a fit to the other."""
-    errors = [np.subtract(*_on_unseen(data, problem, explanation, hidden)) for hidden, _ in _halves(data)]
-    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
 def _on_unseen(data: Observations, problem: Problem, explanation: Explanation, hidden: Flags) -> tuple[Array, Array]:
