@@ -1,16 +1,19 @@
 """Live measuring of a network camera on loopback: frames lost, lateness, processor, memory.
 
     python -m tests.benchmarks.live [--seconds 600] [--size 640x480] [--rate-hz 25] [--record] [--page] [--viewers 4]
-        [--rtsp] [--busy 2] [--colour] [--json]
+        [--rtsp] [--busy 2] [--colour] [--wall] [--json]
 
 ffmpeg serves MJPEG over HTTP (grey, or with --colour 4:4:4), or with --rtsp GStreamer H.264 over RTSP; with --busy so
-many other processes reckon without end; with --json the figures are printed for programs. Capture and measuring run in
-this process, as `fingervision live` runs them. It ends by itself. Each line is a figure, with its bar where it has one.
+many other processes reckon without end; with --wall the fingers have side walls of 2 px in view (448x320), which are
+learnt together with the camera and take longest; with --json the figures are printed for programs. Capture and
+measuring run in this process, as `fingervision live` runs them. It ends by itself. Each line is a figure, with its bar
+where it has one.
 
 * lost: frames that arrived and were not measured, and frames that are missing between two that arrived;
 * expected: frames that ffmpeg's pace gives in the time between the first and the last;
 * late: from arrival to number;
 * core: processor time of this process, as a share of one core (decoding, measuring, watching);
+* alarms: what the page would show in red at any time;
 * memory: resident, after a tenth of the time (the first minute of ten) and at the end.
 
 With --page somebody looks: the page is served and each picture acknowledged, by a process of its own. With --viewers so
@@ -43,10 +46,12 @@ from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.gaps_csv import GapRow
+from tests.benchmarks.camera_artefacts.optics import Surface
 from tests.benchmarks.frame import Namespace, benchmark, told
+from tests.benchmarks.unknown_cameras import CURVES, drawn, lossless
 
 ASLEEP_AFTER_S, BEGINS_WITHIN_S = 5.0, 30.0
-CYCLE, PX_PER_MM = 50, 34.0
+CYCLE, PX_PER_MM, WALL_PX = 50, 34.0, 2.0
 MOST_CORE, MOST_GROWN_MB = 0.25, 10.0
 JPEG_BEGINS = b"\xff\xd8\xff"
 SERVER = Path(__file__).parents[1] / "live" / "rtsp_server.py"
@@ -115,8 +120,10 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
         session.record()
     first, used_s, began_s = len(frames), time.process_time(), time.monotonic()
     early_bytes = 0
+    alarms = set[str]()
     while time.monotonic() - began_s < wanted.seconds:
         time.sleep(0.5)
+        alarms |= {session.supervisor.trouble} - {""}
         if not early_bytes and time.monotonic() - began_s > 0.1 * wanted.seconds:
             early_bytes = resident_bytes()
     core = (time.process_time() - used_s) / (time.monotonic() - began_s)
@@ -132,7 +139,13 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     late_ms = 1e3 * np.array(late_s[first : last + 1])
     p50_ms, p99_ms = np.percentile(late_ms, (50, 99))
     if wanted.json:
-        figures = {"measured": last - first, "expected": expected, "lost": lost, "late_p99_ms": float(p99_ms)}
+        figures = {
+            "measured": last - first,
+            "expected": expected,
+            "lost": lost,
+            "alarms": sorted(alarms),
+            "late_p99_ms": float(p99_ms),
+        }
         figures |= {"late_worst_ms": float(late_ms.max()), "core": core, "early_mb": early_bytes / 1e6}
         print(json.dumps(figures | {"late_mb": late_bytes / 1e6, "period_ms": period_ms, "load": load}))
         return
@@ -141,6 +154,7 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     print(f"{wanted.size} at {wanted.rate_hz} frames/s for {arrived[last] - arrived[first]:.1f} s{recorded}{looked}")
     told("frames measured, of so many expected", f"{last - first} of {expected:.1f}")
     told("frames lost", f"{lost}", "none", lost == 0)
+    told("alarms", " ".join(sorted(alarms)) or "none", "none", not alarms)
     told("late, median", f"{p50_ms:.1f} ms")
     told("late, 99th percentile", f"{p99_ms:.1f} ms", f"a frame, {period_ms:.1f} ms", p99_ms <= period_ms)
     told("late, worst", f"{late_ms.max():.1f} ms")
@@ -163,9 +177,10 @@ def looked_at(session: Session, viewers: int) -> "list[subprocess.Popen[bytes]]"
     return looking
 
 
-def draw(path: Path, width_px: int, height_px: int, *, in_colour: bool) -> None:
+def draw(path: Path, width_px: int, height_px: int, *, in_colour: bool, wall: bool) -> None:
     """Write JPEG pictures of a moving gripper, one after the other."""
     rng = np.random.default_rng(3)
+    walls = lossless(drawn(3, CYCLE, Surface(wall_px=WALL_PX)), CURVES["linear"]).pictures if wall else ()
     options = [cv2.IMWRITE_JPEG_QUALITY, 92]
     if in_colour:
         options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
@@ -173,7 +188,7 @@ def draw(path: Path, width_px: int, height_px: int, *, in_colour: bool) -> None:
         for index in range(CYCLE):
             gap_px = PX_PER_MM * (2.5 - 1.5 * cos(2 * pi * index / CYCLE))
             scene = two_fingers(gap_px, radius_px=20.0, frame=(width_px, height_px))
-            picture = render(scene, Camera(blur_px=0.9, noise_grey=2.0), rng)
+            picture = walls[index] if wall else render(scene, Camera(blur_px=0.9, noise_grey=2.0), rng)
             picture = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if in_colour else picture
             file.write(cv2.imencode(".jpg", picture, options)[1].tobytes())
 
@@ -193,6 +208,7 @@ def resident_bytes() -> int:
     rtsp=False,
     busy=0,
     colour=False,
+    wall=False,
     json=False,
 )
 def main(wanted: Namespace) -> None:
@@ -200,7 +216,7 @@ def main(wanted: Namespace) -> None:
     width_px, height_px = (int(part) for part in wanted.size.split("x"))
     with tempfile.TemporaryDirectory() as folder:
         pictures = Path(folder) / "camera.mjpeg"
-        draw(pictures, width_px, height_px, in_colour=wanted.colour)
+        draw(pictures, width_px, height_px, in_colour=wanted.colour, wall=wanted.wall)
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port = free.getsockname()[1]

@@ -2,11 +2,12 @@
 
     python -m tests.benchmarks.live_bars [--minutes 10]
 
-Four parts run one after the other, each `tests.benchmarks.live` in a process of its own with its camera on loopback,
+Five parts run one after the other, each `tests.benchmarks.live` in a process of its own with its camera on loopback,
 640x480 at 25 Hz:
 
 * alone, MJPEG over HTTP: processor share of capture and measuring, memory;
 * the page open, without and with four viewers and one that sleeps: what these add;
+* recording, with walls beside the fingers: frames lost and alarms while the run's camera is learnt;
 * MJPEG beside two busy processes, and RTSP (H.264) beside two busy processes: frames lost, lateness.
 
 `--minutes` is the length of each of the parts beside busy processes; the others take a fifth of it. The share of a core
@@ -48,6 +49,9 @@ def main(chosen: Namespace) -> None:
     added = viewers["core"] - page["core"]
     told("four viewers and a sleeping one add", f"{100 * added:+.1f} % of a core", "3 %", met=added <= MOST_ADDED)
     print(f"{'with one page open, share of a core':58} {100 * page['core']:>20.1f} %")
+    walls = part(short, "--page", "--record", "--wall")
+    told("recording with walls: frames lost", f"{walls['lost']} of {walls['measured']}", "none", met=walls["lost"] <= 0)
+    told("recording with walls: alarms", " ".join(walls["alarms"]) or "none", "none", met=not walls["alarms"])
     for name, options in (("MJPEG", ()), ("RTSP", ("--rtsp",))):
         busy = part(long, "--busy=2", *options)
         where = f"{name}, {long_s / 60:g} min beside two busy processes"
