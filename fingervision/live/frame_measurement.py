@@ -40,16 +40,16 @@ class LiveCamera:
     def used(self, settings: Settings, task: Task, run: RunFolder | None) -> Settings:
         """Settings with the camera as far as it is known; another scale or response starts again.
 
-        A run learns its camera from its own frames, and the view takes it over.
+        A run learns its camera from its own frames, and the view takes it over; until then, the view's own counts.
         """
         if self._key[0] is not task.scale or self._key[1] is not task.response:
             self._key, self._frames, self._learning, self._camera = (task.scale, task.response), [], None, None
-        if run is not None:
+        camera = None if run is None else run.camera
+        if camera is not None:
             self._frames, self._learning = [], None
-            if run.camera is not None and run.camera is not self._camera:
-                self._know(run.camera)
         elif self._learning is not None and self._learning.done():
             camera, self._learning = self._learning.result(), None
+        if camera is not None and camera is not self._camera:
             self._know(camera)
         return settings if self._camera is None else replace(settings, camera=self._camera)
 

@@ -2,19 +2,27 @@
 
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic, sleep
 
 import numpy as np
 
 from calib.calibration import BareScale
+from fingervision.domain.camera import Origin
 from fingervision.domain.frame import Coding, Frame
 from fingervision.frames.source import Description, open_source
+from fingervision.live.choices import Choices
+from fingervision.live.frame_measurement import FrameMeasurement
 from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.measuring.camera_learning import WANTED
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import measure_frame
 
 COUNT, SIZE_PX, SCALE = 40, (160, 120), 17.0
+DESCRIPTION = Description("camera", "camera", "raw", Coding.LOSSLESS, *SIZE_PX, 25.0, True, None)
+# The computer may be loaded by other tests.
+PATIENCE_S = 120.0
 
 
 def coded_as_srgb(levels: np.ndarray) -> np.ndarray:
@@ -23,14 +31,35 @@ def coded_as_srgb(levels: np.ndarray) -> np.ndarray:
     return np.round(255.0 * coded).astype(np.uint8)
 
 
+def frame_of(k: int) -> Frame:
+    scene = two_fingers(50.0 + 0.5 * k, below_tip_px=5.1, width_px=25.0, frame=SIZE_PX)
+    levels = coded_as_srgb(render(scene, Camera(noise_grey=1.0), np.random.default_rng(k)))
+    return Frame(levels, k + 7, 3.0 + k / 25.0, Coding.LOSSLESS)
+
+
+def test_a_camera_that_is_being_learnt_when_a_run_begins_is_used_until_the_run_has_learnt_its_own(
+    tmp_path: Path,
+) -> None:
+    view, choices = FrameMeasurement(SIZE_PX), Choices(BareScale(SCALE))
+    assert choices.task is not None
+    for k in range(WANTED):
+        view.measured(frame_of(k), choices)
+    run = RunFolder(tmp_path / "runs", DESCRIPTION, choices.task, None)
+    assert view.settings is not None
+    until_s = monotonic() + PATIENCE_S
+    while view.settings.camera.response.origin is not Origin.LEARNT and monotonic() < until_s:
+        sleep(0.02)
+        view.measured(frame_of(WANTED), choices, run)
+    run.close("The test ended.")
+    assert view.settings.camera.response.origin is Origin.LEARNT
+    assert run.camera is None
+
+
 def test_a_run_whose_camera_becomes_known_on_the_way_has_the_table_of_its_video(tmp_path: Path) -> None:
     task = Task(BareScale(SCALE))
-    description = Description("camera", "camera", "raw", Coding.LOSSLESS, *SIZE_PX, 25.0, True, None)
-    run = RunFolder(tmp_path / "runs", description, task, None)
+    run = RunFolder(tmp_path / "runs", DESCRIPTION, task, None)
     for k in range(COUNT):
-        scene = two_fingers(50.0 + 0.5 * k, below_tip_px=5.1, width_px=25.0, frame=SIZE_PX)
-        levels = coded_as_srgb(render(scene, Camera(noise_grey=1.0), np.random.default_rng(k)))
-        frame = Frame(levels, k + 7, 3.0 + k / 25.0, Coding.LOSSLESS)
+        frame = frame_of(k)
         # As the view does: with what is known of the camera when a frame comes.
         settings = task.settings if run.camera is None else replace(task.settings, camera=run.camera)
         run.add(RecordedFrame(frame, (), (settings, measure_frame(frame, settings))))
