@@ -96,9 +96,11 @@ def try_effect(effect: object) -> DriveEffect | PointEffect:
         return effect  # the effect cannot be seen in so few samples
     values = {p.name: 0.0 if p.run is not None else float(p.starting_values()[0]) for p in searched}
     neutral = neutral_values(searched)
+    # A period of 0 lies beyond its bounds, and an effect need not answer for it.
+    least = {p.name: min(max(0.0, p.lower), p.upper) for p in searched}
     try:
         _moved_mm(effect, history, values)
-        moved_mm = [_moved_mm(effect, history, each) for each in (neutral, dict.fromkeys(neutral, 0.0))]
+        moved_mm = [_moved_mm(effect, history, each) for each in (neutral, least)]
     except EffectAnswerError as error:
         raise MisfitError(str(error).split(f"{name} ", 1)[1].split(": correct it")[0]) from error
     if min(moved_mm) > ROUNDING_MM:
