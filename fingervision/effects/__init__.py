@@ -16,7 +16,7 @@ from typing import Any
 from fingervision.domain.effect import DriveEffect, Effect, PointEffect, Stage
 from fingervision.domain.further_check import FurtherCheck
 from fingervision.effects.effect_list import EffectList
-from fingervision.effects.trial import BUILT_IN, effects_in
+from fingervision.effects.trial import effects_in
 from fingervision.plugins.origin import SESSION, Origin
 from fingervision.plugins.registry import Registry
 from fingervision.plugins.watched_import import importing
@@ -43,12 +43,15 @@ for _kind in (Effect, DriveEffect, PointEffect):
 def _built_in() -> dict[str, Effect]:
     modules = (importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__))
     found = [module.EFFECT for module in modules if hasattr(module, "EFFECT")]
-    BUILT_IN[:] = found
     return {effect.name: effect for effect in found}
 
 
 REGISTRY: Registry[Effect] = Registry(
-    "fingervision.effects", "effect", lambda: tuple(_built_in()), lambda name: _built_in()[name], effects_in
+    "fingervision.effects",
+    "effect",
+    lambda: tuple(_built_in()),
+    lambda name: _built_in()[name],
+    lambda held: effects_in(held, _built_in().values()),
 )
 _by_version: dict[int, tuple[dict[str, Effect], dict[str, Origin]]] = {}
 

@@ -13,8 +13,6 @@ from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 from fingervision.plugins.faults import MisfitError
 
-BUILT_IN: list[Effect] = []
-"""The built-in effects; the package `fingervision.effects` fills this list."""
 ROUNDING_MM = 1e-9
 """Tolerance for rounding errors of a few operations on numbers of some millimetres."""
 SAMPLES = 12
@@ -37,8 +35,15 @@ class EffectAnswerError(FingervisionError):
         self.name, self.words = name, words
 
 
-def effects_in(held: object) -> dict[str, Effect]:
+def effects_in(held: object, built_in: Iterable[Effect]) -> dict[str, Effect]:
     """Return the effects that a module defines at its top level, or the object if it is an effect, after a trial.
+
+    Parameters
+    ----------
+    held : object
+        A module or an effect.
+    built_in : iterable of Effect
+        The effects of this package; one that a module imports is not its own.
 
     Raises
     ------
@@ -47,8 +52,7 @@ def effects_in(held: object) -> dict[str, Effect]:
     """
     found: list[object] = [held]
     if isinstance(held, ModuleType):
-        # Effects that a module imports from the package are not its own.
-        ours = {id(effect) for effect in BUILT_IN}
+        ours = {id(effect) for effect in built_in}
         own = {id(value): value for value in vars(held).values() if isinstance(value, Effect) and id(value) not in ours}
         found = list(own.values())
         if not found and hasattr(held, "EFFECT"):
