@@ -1,6 +1,6 @@
 """Mean profile of the stored levels across a straight edge: all its pixels together, in bins narrower than a pixel."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,9 @@ Floats = NDArray[np.float64]
 
 # Width of a bin across the edge (pixels), smallest number of pixels in a bin, and smallest number of bins of a profile.
 BIN_PX, FEWEST_IN_BIN, FEWEST_BINS = 0.2, 8, 24
+# Fewest parts along an edge that tell what lies on it, number of bins over which their variance is averaged, and
+# standard deviations by which it must exceed their noise.
+FEWEST_PARTS, SMOOTHED, SURE = 3, 7, 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +30,9 @@ class EdgeProfile:
         +1 if the light side has the larger coordinates in the picture, -1 otherwise.
     is_outer : bool
         Whether the edge belongs to the group that decides if the two groups contradict each other.
+    u_structure : ndarray of float
+        Standard deviation of the mean level by what lies on the edge (texture, dirt, wear), smooth over a few pixels;
+        zero if its parts are alike, empty if that is not known.
     """
 
     away_px: Floats
@@ -34,6 +40,7 @@ class EdgeProfile:
     u_level: Floats
     side: float
     is_outer: bool = False
+    u_structure: Floats = field(default_factory=lambda: np.zeros(0))
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -57,7 +64,14 @@ class EdgeProfile:
 
 
 def binned_profile(
-    away_px: Floats, level: Floats, group: NDArray[np.intp], rounding: float, side: float, *, is_outer: bool = False
+    away_px: Floats,
+    level: Floats,
+    group: NDArray[np.intp],
+    rounding: float,
+    side: float,
+    *,
+    is_outer: bool = False,
+    part: NDArray[np.intp] | None = None,
 ) -> EdgeProfile | None:
     """Mean profile of the pixels across one edge; None if there are too few.
 
@@ -75,6 +89,9 @@ def binned_profile(
         +1 if `away_px` increases with the coordinates in the picture, -1 otherwise.
     is_outer : bool
         See `EdgeProfile`.
+    part : ndarray of int, shape (n,), or None
+        Number of the part along the edge, the same in all pictures: what lies on the edge does not average out over
+        them.
     """
     place = np.floor(away_px / BIN_PX).astype(int)
     place -= place.min()
@@ -93,10 +110,52 @@ def binned_profile(
     full = count >= FEWEST_IN_BIN
     if np.count_nonzero(full) < FEWEST_BINS:
         return None
+    structure = np.zeros(0) if part is None else _structure(place, left, part, variance, mean, full)
     middle, mean, u_mean = middle[full], mean[full], u_mean[full]
     if mean[-4:].mean() < mean[:4].mean():  # away from the edge it becomes dark
-        return EdgeProfile(-middle[::-1], mean[::-1], u_mean[::-1], -side, is_outer)
-    return EdgeProfile(middle, mean, u_mean, side, is_outer)
+        return EdgeProfile(-middle[::-1], mean[::-1], u_mean[::-1], -side, is_outer, structure[::-1])
+    return EdgeProfile(middle, mean, u_mean, side, is_outer, structure)
+
+
+def _structure(
+    place: NDArray[np.intp],
+    left: Floats,
+    part: NDArray[np.intp],
+    variance: Floats,
+    mean: Floats,
+    full: NDArray[np.bool_],
+) -> Floats:
+    """Standard deviation of the mean profile by the differences of its parts beyond their noise; zero without any.
+
+    A part may have its own light and its own place: both plateaus, their slopes and the derivative of the profile are
+    taken off first.
+    """
+    bins, parts = np.count_nonzero(full), int(part.max()) + 1
+    sums, counts = np.zeros((2, parts, full.size))
+    np.add.at(sums, (part, place), left)
+    np.add.at(counts, (part, place), 1.0)
+    sums, counts = sums[:, full], counts[:, full]
+    known = np.minimum(counts, 1.0).sum(axis=1) > 0.75 * bins
+    if np.count_nonzero(known) < FEWEST_PARTS:
+        return np.zeros(bins)
+    sums, counts, noise = sums[known], counts[known], variance[full]
+    share = (mean[full] - mean[full].min()) / max(np.ptp(mean[full]), 1e-9)
+    at = np.linspace(-1.0, 1.0, bins)
+    allowed = np.array([share, 1.0 - share, share * at, (1.0 - share) * at, np.gradient(share)]).T
+    found, expected = np.zeros((2, bins))
+    for own, count in zip(sums, counts, strict=True):
+        weight = np.sqrt(count)
+        away = own / np.maximum(weight, 1.0)  # of unit weight: its variance is that of a pixel
+        basis = np.linalg.qr(allowed * weight[:, None])[0]
+        free = away - basis @ (basis.T @ away)
+        # What was taken off is missing in the noise as well.
+        found += count * free**2
+        expected += count * noise * np.maximum(1.0 - np.sum(basis**2, axis=1), 0.0)
+    total = counts.sum(axis=0) ** 2
+    excess = np.convolve(found - expected, np.ones(SMOOTHED), "same")
+    if float(np.sum(found) / np.sum(expected)) < 1.0 + SURE / np.sqrt(0.5 * bins * len(sums)):
+        return np.zeros(bins)
+    return np.asarray(np.sqrt(np.maximum(excess / SMOOTHED, 0.0) / total))
 
 
 def _smooth(variance: Floats) -> Floats:

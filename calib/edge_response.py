@@ -54,6 +54,8 @@ LEAST_PROBABILITY, CERTAIN = 1e-3, 0.99
 REACH_SIGMAS, REACH_EXTRA_PX = 4.0, 3.0
 # Steps of the Levenberg-Marquardt fit, change of the cost below which it has converged, and step of the derivatives.
 MOST_STEPS, CONVERGED, STEP = 25, 0.02, 1e-4
+# Length over which what lies on an edge is correlated (pixels).
+STRUCTURE_PX = 1.5
 # Steps after which the best of several starts is chosen.
 FIRST_STEPS = 7
 # Difference in log evidence beyond which a scene is not tried with further tone curves, which gain less than this.
@@ -217,7 +219,7 @@ def fit_families(
     steps : sequence of float
         Steps of a codec's quantiser for the eight frequencies across an edge (shares of full scale); empty without one.
     """
-    data = _Data.of(profiles, model_error, scale, steps)
+    data = _Data.of(profiles, model_error, scale, steps).with_structure()
     fits: list[FamilyFit] = []
     for family in (*FAMILIES, *_tagged(tagged)):
         # A family with parameters begins where the best one has ended, because edges and optics are the same.
@@ -273,7 +275,7 @@ def fit_scenes(
 def _thinned(profile: EdgeProfile) -> EdgeProfile:
     """Profile with every third bin, from which a fit may begin."""
     away, level, u = (each[1::3] for each in (profile.away_px, profile.level, profile.u_level))
-    return replace(profile, away_px=away, level=level, u_level=u)
+    return replace(profile, away_px=away, level=level, u_level=u, u_structure=profile.u_structure[1::3])
 
 
 def fixed_family(response: CameraResponse) -> Family:
@@ -289,7 +291,7 @@ def family(name: str) -> Family:
 
 def is_more_beside(profiles: Sequence[EdgeProfile], model_error: float, family: Family) -> bool:
     """Whether steps of light beside the edges would explain what the fit of a family leaves (score test)."""
-    data = _Data.of(profiles, model_error, 1.0, (), np.inf)
+    data = _Data.of(profiles, model_error, 1.0, (), np.inf).with_structure()
     fit = _fit(family, data, data.start())
     wider = fit.edges[SHARED + OWN - 1 : SHARED + OWN * len(profiles) : OWN]
     if abs(float(wider[~data.is_outer].mean() - wider[data.is_outer].mean())) > WIDER_INSIDE:
@@ -409,6 +411,7 @@ class _Data:
     sigma: float
     bands: Floats
     u_lost: Floats
+    structure: Floats
     whiten: tuple[Floats, ...] = ()
 
     @classmethod
@@ -422,13 +425,14 @@ class _Data:
     ) -> "_Data":
         sigma = float(np.median([_width(profile) for profile in profiles]))
         reach = reach or REACH_SIGMAS * sigma + REACH_EXTRA_PX
-        away, level, u, edge = [], [], [], []
+        away, level, u, edge, structure = [], [], [], [], []
         for k, profile in enumerate(profiles):
             near = np.abs(profile.away_px) < reach
             away.append(profile.away_px[near])
             level.append(profile.level[near])
             u.append(scale * np.hypot(profile.u_level[near], model_error * profile.contrast))
             edge.append(np.full(away[-1].size, k))
+            structure.append(scale * profile.u_structure[near] if profile.u_structure.size else 0.0 * u[-1])
         return cls(
             np.concatenate(away),
             np.concatenate(level),
@@ -440,16 +444,23 @@ class _Data:
             sigma,
             _bands(away, len(steps)),
             _u_lost(sigma, float(np.median([profile.contrast for profile in profiles])), np.array(steps)),
+            np.concatenate(structure),
         )
 
+    def with_structure(self) -> "_Data":
+        """Covariance of what lies on the edges, where there is any."""
+        return self.with_discrepancy(0.0) if self.structure.any() else self
+
     def with_discrepancy(self, share: float) -> "_Data":
-        """Add what real edges differ from any model: smooth over a pixel, a share of the contrast."""
+        """Add the structure on the edges, and what real edges differ from any model: a share of the contrast."""
         contrast = np.ptp(self.ends, axis=1)
         whiten = []
         for e in range(len(self.ends)):
             mine = self.edge == e
             apart = self.away[mine][:, None] - self.away[mine]
             covariance = np.diag(self.u[mine] ** 2) + (share * contrast[e]) ** 2 * np.exp(-0.5 * apart**2)
+            own = self.structure[mine]
+            covariance += own[:, None] * own * np.exp(-0.5 * (apart / STRUCTURE_PX) ** 2)
             whiten.append(np.linalg.inv(np.linalg.cholesky(covariance)))
         return replace(self, whiten=tuple(whiten))
 

@@ -21,6 +21,9 @@ STRAIGHT_PX, FEWEST_ROWS = 0.4, 6
 # clipped.
 LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
 
+# Length of a part along a flank (pixels), longer than texture and dirt are correlated.
+PART_PX = 8
+
 # A picture (NaN where the sensor is defective) and the edges in it.
 Levels = GreyImage | NDArray[np.float32]
 Seen = tuple[Levels, EdgePoints]
@@ -64,15 +67,20 @@ def flank_profile(
     gathered = [each for upright, edges in seen if (each := _one(upright, edges, finger, part, extra_px)) is not None]
     if not gathered:
         return None
-    away = np.concatenate([found for found, _ in gathered])
-    level = np.concatenate([stored for _, stored in gathered]) / top_level
-    frame = np.repeat(np.arange(len(gathered)), [found.size for found, _ in gathered])
+    away = np.concatenate([found for found, *_ in gathered])
+    level = np.concatenate([stored for _, stored, _ in gathered]) / top_level
+    frame = np.repeat(np.arange(len(gathered)), [found.size for found, *_ in gathered])
+    rows = np.concatenate([row for *_, row in gathered])
     outward = float(seen[0][1].lines.outward[finger, part][0])
-    return binned_profile(away, level, frame, 1.0 / top_level, outward, is_outer=not is_inner)
+    return binned_profile(
+        away, level, frame, 1.0 / top_level, outward, is_outer=not is_inner, part=(rows - rows.min()) // PART_PX
+    )
 
 
-def _one(upright: Levels, edges: EdgePoints, finger: int, part: slice, extra_px: float) -> tuple[Floats, Floats] | None:
-    """Distances outwards from the flank's line, and stored levels, of one picture."""
+def _one(
+    upright: Levels, edges: EdgePoints, finger: int, part: slice, extra_px: float
+) -> tuple[Floats, Floats, NDArray[np.intp]] | None:
+    """Distances outwards from the flank's line, stored levels, and rows counted from the first, of one picture."""
     real = np.flatnonzero(edges.lines.weight[finger, part] > 0)
     rows = real[real.size // 2 :]
     if rows.size < FEWEST_ROWS:
@@ -86,9 +94,14 @@ def _one(upright: Levels, edges: EdgePoints, finger: int, part: slice, extra_px:
     keep = off < 3.0 * max(spread, 0.02)
     if np.count_nonzero(keep) < FEWEST_ROWS:
         return None
+    every = np.arange(int(fixed.min()), int(fixed.max()) + 1)
+    # Rows beside one that does not fit are left out: what lies there, such as dirt, is no part of the profile.
+    order = np.argsort(fixed)
+    is_clean = np.interp(every, fixed[order], keep[order].astype(float)) == 1.0
+    if np.count_nonzero(is_clean) < FEWEST_ROWS:
+        is_clean[:] = True
     slope, at = np.polyfit(fixed[keep], found[keep], 1)
     outward = int(edges.lines.outward[finger, part][0])
-    every = np.arange(int(fixed.min()), int(fixed.max()) + 1)
     line = at + slope * every
     room = _room_px(upright, edges, line)
     sigma = float(edges.blur_px[finger, 0])
@@ -96,11 +109,15 @@ def _one(upright: Levels, edges: EdgePoints, finger: int, part: slice, extra_px:
     if reach < REACH_SIGMAS * sigma:
         return None
     columns = np.rint(line).astype(int)[:, None] + outward * np.arange(-reach, reach + 1)
-    inside = (columns >= 0) & (columns < upright.shape[1])
+    inside = (columns >= 0) & (columns < upright.shape[1]) & is_clean[:, None]
     levels = upright[np.broadcast_to(every[:, None], columns.shape)[inside], columns[inside]].astype(np.float64)
     is_known = np.isfinite(levels)
     cosine = float(1.0 / np.hypot(1.0, slope))
-    return (outward * (columns - line[:, None]) * cosine)[inside][is_known], levels[is_known]
+    away, row = (
+        outward * (columns - line[:, None]) * cosine,
+        np.broadcast_to((every - every[0])[:, None], columns.shape),
+    )
+    return away[inside][is_known], levels[is_known], row[inside][is_known]
 
 
 def _room_px(upright: Levels, edges: EdgePoints, line: Floats) -> float:

@@ -103,6 +103,8 @@ def mean_profile(
     count, distance, total = np.empty((3, int((3 * REACH_PX + room + 2) / BIN_PX)))
     _bins(upright, light, between, edge, slopes, outward, room, count, distance, total)
     full = count >= FEWEST_IN_BIN
+    if not full.any():  # few rows of a slanted flank
+        return None
     return MeanProfile(distance[full] / count[full], total[full] / count[full], count[full])
 
 

@@ -68,3 +68,47 @@ def test_after_h264_a_linear_and_a_usual_curve_are_equally_probable(name: str) -
     assert "H.264" in camera.response.words
     error_px, u_px = error_and_u_px(camera.response, "srgb")
     assert u_px == pytest.approx(abs(error_px) / np.sqrt(2.0), rel=0.01)
+
+
+def textured_profiles(seed: int, *, is_told: bool) -> list[EdgeProfile]:
+    """Profiles of edges of a linear camera whose dark side has a pattern, which moves with it."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[0:64, 0:64].astype(float)
+    found = []
+    for side in (1.0, -1.0, 1.0, -1.0):
+        pattern = cv2.GaussianBlur(rng.standard_normal((64, 64)), (0, 0), 1.5)
+        pattern *= 0.08 * (OUTSIDE - INSIDE) / pattern.std()
+        away, level, rows, frames = [], [], [], []
+        tilt, at = rng.uniform(-0.04, 0.04), rng.uniform(28.0, 36.0)
+        for frame in range(6):
+            way = rng.uniform(-0.5, 0.5)
+            distance = side * (x - at - way - tilt * (y - 32))
+            share = ndtr(distance / np.hypot(SIGMA_PX, 12.0**-0.5))
+            moved = cv2.warpAffine(pattern, np.float32([[1, 0, way], [0, 1, 0]]), (64, 64), flags=cv2.INTER_CUBIC)
+            light = (INSIDE + moved) * (1.0 - share) + OUTSIDE * share
+            light += np.sqrt(np.maximum(light, 0.0) / 8000.0) * rng.standard_normal(light.shape)
+            near = np.abs(distance) < 9.0
+            away.append(distance[near])
+            level.append(np.rint(255.0 * np.clip(light, 0.0, 1.0))[near] / 255.0)
+            rows.append(y[near].astype(int))
+            frames.append(np.full(away[-1].size, frame))
+        part = np.concatenate(rows) // 8 if is_told else None
+        bins = binned_profile(
+            np.concatenate(away), np.concatenate(level), np.concatenate(frames), 1.0 / 255.0, side, part=part
+        )
+        assert bins is not None
+        found.append(bins)
+    return found
+
+
+def test_texture_of_the_fingers_is_in_the_uncertainty() -> None:
+    """A pattern is the same in all pictures, and does not average out over them."""
+    silent = {True: 0, False: 0}
+    for seed in range(40, 52):
+        for is_told in silent:
+            profiles = textured_profiles(seed, is_told=is_told)
+            camera = learnt_from_profiles(profiles, ASSUMED_CAMERA, Coding.LOSSLESS)
+            error_px, u_px = error_and_u_px(camera.response, "linear")
+            silent[is_told] += abs(error_px) > max(2.0 * u_px, 0.05)
+    assert silent[False] > 0, "nothing would be shown by these patterns"
+    assert silent[True] == 0
