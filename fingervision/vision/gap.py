@@ -32,7 +32,6 @@ from fingervision.vision.residuals import (
     shape_holds,
     shared_points,
     spread,
-    top_aside_variance,
 )
 from fingervision.vision.rough_corner import with_corner_doubt
 from fingervision.vision.roughness import Roughness, best_linear, roughness, with_roughness
@@ -242,8 +241,6 @@ def _measuring_points(
                 return chains, NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
             covariance = found.covariance * (spread(end) * shared if shape.rough is None else 1.0)
             covariance[1, 1] += beyond
-            if top_aside := top_aside_variance(p, end):
-                covariance += top_aside * np.outer((1.0, found.slope), (1.0, found.slope))
             own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
         if own is None:
             return chains, NoGap(Status.NO_FINGERS, BROKEN_BY[coding])

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.loops import loop
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import INNER_C, INNER_M, INNER_R, OUTER_C, OUTER_M, OUTER_R, PARAMETERS, on_flanks
+from fingervision.vision.finger_shape import INNER_M, INNER_R, OUTER_M, PARAMETERS, on_flanks
 from fingervision.vision.flanks import STEEPEST
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
@@ -129,24 +129,6 @@ def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint
     if np.count_nonzero(is_aside) < FEWEST_OF_CORNER or end.parameters[INNER_R] < FILLET_SHARE * below_tip_px:
         return 0.0
     return float(np.max(np.abs(end.residual * points.u)[is_aside]))
-
-
-def top_aside_variance(points: OutlinePoints, end: FingerEnd) -> float:
-    """Variance of the tip's height if the fit rejected most points of the top between the corners.
-
-    The true top may lie anywhere between the fitted top and the farthest rejected point, as in `set_aside_variance`.
-    The result is 0 if fewer than half of the points are rejected, or if there is no straight top between the corners.
-    """
-    is_aside = end.robust <= 0.0
-    if np.count_nonzero(is_aside) < FEWEST_OF_CORNER:
-        return 0.0
-    inner = end.parameters[INNER_C] - end.parameters[INNER_R]
-    outer = end.parameters[OUTER_C] + end.parameters[OUTER_R]
-    is_top = ~points.is_row & (points.x > outer) & (points.x < inner)
-    is_aside &= is_top
-    if np.count_nonzero(is_aside) <= max(MOST_REJECTED * np.count_nonzero(is_top), FEWEST_OF_CORNER - 1):
-        return 0.0
-    return float(2.0 / 3.0 * np.max(np.abs(end.residual * points.u)[is_aside]) ** 2)
 
 
 def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool:
