@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from fingervision.domain.camera import CameraModel, DefectPixels
 from fingervision.domain.frame import Frame
@@ -29,8 +30,8 @@ RINGS_PX = 7
 SMALLEST_PX = 5
 # Largest number of defects: more of them are texture, or noise of salt and pepper.
 MOST_DEFECTS = 100
-# Share of the pixels whose excess tells the noise, edges and codec included, and its quantile for normal noise.
-MOST, MOST_SIGMAS = 0.99, 2.576
+# Share of the pixels whose excess tells the noise, edges and codec included: with lines among them, and without.
+MOST_WITH_LINES, MOST = 0.95, 0.99
 # Cubic interpolation from the two neighbours on either side.
 NEAR, FAR = 4.0 / 6.0, -1.0 / 6.0
 
@@ -51,11 +52,11 @@ def defect_pixels(pictures: Sequence[GreyImage], top_level: int) -> tuple[Defect
     mean *= np.float32(1.0 / (top_level * len(pictures)))
     if min(mean.shape) < SMALLEST_PX:
         return ()
-    seen = excess, around, is_defect = _sharper(mean, len(pictures), top_level)
+    seen = excess, around, is_defect = _sharper(mean, len(pictures), top_level, MOST_WITH_LINES)
     columns, rows = _whole_columns(mean, *seen), _whole_columns(mean.T, excess.T, around.T, is_defect.T)
     lines = [DefectPixels(x, None, float(np.median(excess[:, x]))) for x in columns]
     lines += [DefectPixels(None, y, float(np.median(excess[y]))) for y in rows]
-    excess, _, is_defect = _sharper(without_defects(mean, lines), len(pictures), top_level)
+    excess, _, is_defect = _sharper(without_defects(mean, lines), len(pictures), top_level, MOST)
     for line in lines:  # a codec draws rings beside them
         if line.x_px is not None:
             is_defect[:, max(line.x_px - RINGS_PX, 0) : line.x_px + RINGS_PX + 1] = False
@@ -65,13 +66,14 @@ def defect_pixels(pictures: Sequence[GreyImage], top_level: int) -> tuple[Defect
     return (*lines, *points) if len(points) <= MOST_DEFECTS else tuple(lines)
 
 
-def _sharper(mean: Floats, count: int, top_level: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def _sharper(mean: Floats, count: int, top_level: int, most: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Excess of every pixel over its neighbours, the range of these, and whether the pixel is sharper than optics."""
     # A median keeps straight edges and leaves out single lines and points.
     smooth = cv2.medianBlur(mean, 3)
     excess, window = mean - smooth, np.ones((5, 5), np.uint8)
     around = np.asarray(cv2.dilate(smooth, window) - cv2.erode(smooth, window))
-    sigma = max(float(np.quantile(np.abs(excess), MOST)) / MOST_SIGMAS, 1.0 / (top_level * np.sqrt(12.0 * count)))
+    rounding = 1.0 / (top_level * np.sqrt(12.0 * count))
+    sigma = max(float(np.quantile(np.abs(excess), most) / ndtri(0.5 + 0.5 * most)), rounding)
     beside = np.maximum(np.abs(_beside(mean)), np.abs(_beside(mean.T).T))
     least = np.maximum(around, max(LEAST_SIGMAS * sigma, LEAST_EXCESS))
     return excess, around, (np.abs(excess) > least) & (beside < MOST_BESIDE * np.abs(excess))
@@ -102,10 +104,10 @@ def without_defects(picture: Levels, defects: Sequence[DefectPixels]) -> Levels:
     out: Levels = picture.copy()
     for defect in defects:
         if defect.x_px is None:
-            own, lines, at = out[defect.y_px], picture, defect.y_px
+            own, lines, at = out[defect.y_px], out, defect.y_px
         else:
             rows = slice(None) if defect.y_px is None else slice(defect.y_px, defect.y_px + 1)
-            own, lines, at = out[rows, defect.x_px], np.swapaxes(picture[rows], 0, 1), defect.x_px  # type: ignore[assignment]
+            own, lines, at = out[rows, defect.x_px], np.swapaxes(out[rows], 0, 1), defect.x_px  # type: ignore[assignment]
         assert at is not None  # noqa: S101 - one of both is stated
         near, far = (_mirrored(lines, at, away) for away in (1, 2))
         levels = NEAR * near + FAR * far

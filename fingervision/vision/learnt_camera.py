@@ -28,7 +28,7 @@ from fingervision.domain.camera import (
 )
 from fingervision.domain.frame import Coding
 from fingervision.vision.flank_profiles import Seen, unclipped_profiles
-from fingervision.vision.learnt_scene import BESIDE_PX, DISCREPANCY, SURE, beside_edges, can_tell_beside
+from fingervision.vision.learnt_scene import BESIDE_PX, DISCREPANCY, SURE, beside_edges, can_tell_beside, with_structure
 
 # Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
 MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.01}
@@ -103,6 +103,7 @@ def learnt_from_profiles(
     """Camera as the mean profiles of unclipped flanks show it, also with more of the ground; see `learnt_camera`."""
     if not profiles:
         return _not_learnt(prior, NO_FLANKS, 1.0 / 3.0)
+    profiles, wide = with_structure(profiles, coding), with_structure(wide, coding)
     overshoot = float(np.median([profile.overshoot for profile in profiles]))
     prior = replace(prior, sharpening=CameraQuantity(overshoot, MODEL_ERROR[coding], Origin.LEARNT))
     if overshoot > MOST_OVERSHOOT:

@@ -1,6 +1,7 @@
 """Learn what stands beside the edges (side walls, bright lines, shadows) from the straight flanks in some frames."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,12 +45,19 @@ def learnt_beside(
     noise : float
         Standard deviation of an edge about the best model, independent from place to place (share of the contrast).
     """
-    profiles = unclipped_profiles(seen, top_level, BESIDE_PX)
+    profiles = with_structure(unclipped_profiles(seen, top_level, BESIDE_PX), coding)
     family = fixed_family(response)
     if not can_tell_beside(profiles) or not is_more_beside(profiles, noise, family):
         return None
     fits = fit_scenes(profiles, DISCREPANCY[coding], [family])
     return beside_edges(fits, profiles)
+
+
+def with_structure(profiles: Sequence[EdgeProfile], coding: Coding) -> list[EdgeProfile]:
+    """Profiles with what lies on the edges; without it after a lossy codec, whose blocks are as long as their parts."""
+    if coding is Coding.LOSSLESS:
+        return list(profiles)
+    return [replace(profile, u_structure=np.zeros(0)) for profile in profiles]
 
 
 def can_tell_beside(profiles: Sequence[EdgeProfile]) -> bool:

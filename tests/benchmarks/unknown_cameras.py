@@ -205,6 +205,17 @@ def noise_reduced(recording: Recording, curve: Curve, share: float) -> Film:
     return Film(tuple(pictures[20:]), Coding.LOSSLESS)
 
 
+def with_column(recording: Recording, curve: Curve, level: int) -> Film:
+    """A dead or hot column of the sensor, across the left finger's inner edge in the first frame."""
+    film = lossless(recording, curve)
+    row = recording.light[0][int(0.6 * recording.light[0].shape[0])]
+    is_dark = row < 0.5 * (row.min() + row.max())
+    column = int(np.flatnonzero(np.diff(is_dark.astype(int)) < 0)[0])
+    for picture in film.pictures:
+        picture[:, column] = level
+    return film
+
+
 CLASSES: dict[str, Callable[[Recording], Film]] = {
     **{name: partial(lossless, curve=curve) for name, curve in CURVES.items()},
     "linear-coma": partial(coma, curve=CURVES["linear"]),
@@ -217,6 +228,9 @@ CLASSES: dict[str, Callable[[Recording], Film]] = {
     "linear-jpeg": partial(jpeg, curve=CURVES["linear"]),
     "srgb-jpeg": partial(jpeg, curve=srgb),
     "linear-noise-reduced": partial(noise_reduced, curve=CURVES["linear"], share=0.8),
+    "linear-dead-column": partial(with_column, curve=CURVES["linear"], level=0),
+    "linear-hot-column": partial(with_column, curve=CURVES["linear"], level=255),
+    "srgb-hot-column": partial(with_column, curve=srgb, level=255),
     "phone": partial(jpeg, curve=s_curve, amount=0.5),
 }
 SURFACES = {

@@ -7,12 +7,13 @@ import pytest
 
 from fingervision.frames.open_container import open_container
 from fingervision.frames.source import open_source
-from tests.frames.test_video_file import H264, smooth_pictures, timed, write_clip
+from tests.clips import h264, write_clip
+from tests.frames.test_video_file import smooth_pictures, timed
 
 
 @pytest.mark.parametrize("suffix", [".mkv", ".mp4"])
 def test_a_title_that_is_no_text_costs_no_frame(tmp_path: Path, suffix: str) -> None:
-    write_clip(tmp_path / f"clip{suffix}", timed(smooth_pictures(4)), H264())
+    write_clip(tmp_path / f"clip{suffix}", timed(smooth_pictures(4)), h264())
     path = tmp_path / f"titled{suffix}"
     with open_container(tmp_path / f"clip{suffix}") as old, av.open(str(path), "w") as new:
         new.metadata["title"] = "Spalt 7"

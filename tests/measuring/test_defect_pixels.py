@@ -12,6 +12,7 @@ from fingervision.domain.frame import Coding
 from fingervision.domain.gap import GapMeasurement
 from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.task import Task
+from fingervision.vision.defect_pixels import defect_pixels, without_defects
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX
 from tests.benchmarks.unknown_cameras import CURVES, PX_PER_MM, Film, drawn, lossless
 
@@ -67,3 +68,14 @@ def test_colours_are_repaired_like_grey_levels() -> None:
     grey = measure_in_memory(film, TASK)
     colour = measure_in_memory(Film(tuple(np.dstack([each] * 3) for each in film.pictures), Coding.LOSSLESS), TASK)
     assert [each.outcome for each in colour.results] == [each.outcome for each in grey.results]
+
+
+@pytest.mark.parametrize(("kind", "top"), [(np.uint8, 255), (np.uint16, 4095)])
+def test_a_row_a_column_and_a_pixel_are_told_apart(kind: type[np.generic], top: int) -> None:
+    rng = np.random.default_rng(9402)
+    pictures = [(top * (0.5 + 0.01 * rng.standard_normal((100, 120)))).astype(kind) for _ in range(5)]
+    for picture in pictures:
+        picture[:, 50], picture[20], picture[70, 90] = 0, top, top
+    found = defect_pixels(pictures, top)
+    assert [(defect.x_px, defect.y_px) for defect in found] == [(50, None), (None, 20), (90, 70)]
+    assert not defect_pixels([without_defects(picture, found) for picture in pictures], top)
