@@ -102,11 +102,11 @@ def binned_profile(
     off = away_px - middle[place]
     slope = np.bincount(place, off * level) / np.maximum(np.bincount(place, off * off), 1e-9)
     left = level - mean[place] - slope[place] * off
-    variance = np.bincount(place, left**2) / np.maximum(count - 2, 1)
+    variance = np.maximum(np.bincount(place, left**2) / np.maximum(count - 2, 1), rounding**2 / 12.0)
     of_group = np.zeros((int(group.max()) + 1, count.size))
     np.add.at(of_group, (group, place), left)
     shared = np.sum(of_group**2, axis=0) / n**2
-    u_mean = np.sqrt(np.maximum(_smooth(shared), np.maximum(variance, rounding**2 / 12.0) / n))
+    u_mean = np.sqrt(np.maximum(_smooth(shared), variance / n))
     full = count >= FEWEST_IN_BIN
     if np.count_nonzero(full) < FEWEST_BINS:
         return None

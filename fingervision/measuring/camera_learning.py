@@ -75,7 +75,7 @@ def learnt_first(
 
 def camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) -> CameraModel:
     """Camera as frames of one recording show it; the camera before if too few of them have a gap."""
-    settings = replace(settings, camera=with_defects(settings.camera, frames, settings.bits))
+    settings = replace(settings, camera=_with_defects(settings.camera, frames, settings.bits))
     before = settings.camera
     looks = [(frame, look) for frame in frames if (look := _steps_alone(frame, settings)) is not None]
     if len(looks) < FEWEST:
@@ -107,7 +107,7 @@ def _steps_alone(frame: Frame, settings: Settings) -> tuple[Seen, bool] | None:
     return (fingers.orientation.view(grey), edges), outcome.light_gap
 
 
-def with_defects(camera: CameraModel, frames: Sequence[Frame], bits: int | None) -> CameraModel:
+def _with_defects(camera: CameraModel, frames: Sequence[Frame], bits: int | None) -> CameraModel:
     """Camera with the defect pixels that stand still in some frames; the camera before if there are too few frames."""
     if len(frames) < FEWEST or len({frame.pixels.shape for frame in frames}) > 1:
         return camera

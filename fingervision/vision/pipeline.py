@@ -42,15 +42,7 @@ from fingervision.vision.settings import LINEAR_CAMERA, Settings
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
-__all__ = [
-    "LINEAR_CAMERA",
-    "Settings",
-    "look_closely",
-    "measure_frame",
-    "measured_levels",
-    "region_of_interest",
-    "steps",
-]
+__all__ = ["LINEAR_CAMERA", "Settings", "look_closely", "measure_frame", "region_of_interest", "steps"]
 
 # Least contrast between the two classes of a picture, as a share of full scale.
 CONTRAST_FLOOR = 0.03
@@ -87,7 +79,7 @@ def measure_frame(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     if cv2.getNumThreads() != 1:
         cv2.setNumThreads(1)
     keep_picture_memory()
-    grey = measured_levels(frame, settings)
+    grey = _measured_levels(frame, settings)
     return _shifted(_attempt(grey, settings, coded_picture(frame, settings)).outcome, settings.region)
 
 
@@ -116,7 +108,7 @@ def look_closely(
     """
     if only_steps:
         settings = replace(settings, camera=replace(settings.camera, beside=STEPS_ALONE))
-    attempt = _attempt(measured_levels(frame, settings), settings, coded_picture(frame, settings))
+    attempt = _attempt(_measured_levels(frame, settings), settings, coded_picture(frame, settings))
     return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
 
 
@@ -135,7 +127,7 @@ def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     list of (str, ndarray of uint8)
         Name and picture of each step: grey, denoised, binary, boundary, edges, and the measured gap.
     """
-    grey = measured_levels(frame, settings)
+    grey = _measured_levels(frame, settings)
     denoised = denoise(grey)
     attempt = _attempt(grey, settings, coded_picture(frame, settings))
     own = Frame(in_eight_bits(grey), frame.index)
@@ -151,7 +143,7 @@ def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
     ]
 
 
-def measured_levels(frame: Frame, settings: Settings) -> GreyImage:
+def _measured_levels(frame: Frame, settings: Settings) -> GreyImage:
     """Grey levels of the part of a frame that is measured, without the camera's defect pixels."""
     return region_of_interest(to_grey(repaired(frame, settings.camera).pixels), settings.region)
 

@@ -112,3 +112,18 @@ def test_texture_of_the_fingers_is_in_the_uncertainty() -> None:
             silent[is_told] += abs(error_px) > max(2.0 * u_px, 0.05)
     assert silent[False] > 0, "nothing would be shown by these patterns"
     assert silent[True] == 0
+
+
+def test_a_drawing_without_noise_has_no_structure() -> None:
+    """Rows that are all the same, as of a drawing: their parts differ by nothing, and the noise is that of rounding."""
+    y, x = np.mgrid[0:64, 0:40].astype(float)
+    away = x - 20.3
+    shifted = [np.round(away + 0.2 * k, 6) for k in range(5)]
+    frames = np.repeat(np.arange(5), away.size)
+    part = np.tile(y.ravel().astype(int) // 8, 5)
+    distance = np.concatenate([one.ravel() for one in shifted])
+    stored = np.rint(255.0 * (INSIDE + (OUTSIDE - INSIDE) * ndtr(distance / SIGMA_PX))) / 255.0
+    bins = binned_profile(distance, stored, frames, 1.0 / 255.0, 1.0, part=part)
+    assert bins is not None
+    assert not bins.u_structure.any()
+    assert bins.u_level.min() > 0.0
