@@ -16,8 +16,9 @@ where it has one.
 * alarms: what the page would show in red at any time;
 * memory: resident, after a tenth of the time (the first minute of ten) and at the end.
 
-With --page somebody looks: the page is served and each picture acknowledged, by a process of its own. With --viewers so
-many look on by the other address, and one more that sleeps (its process is stopped while pictures come).
+With --page somebody looks: the page is served and each picture acknowledged, by a process of its own; the longest that
+any of them waited for a new picture is printed (2 s without one is a page that stands still). With --viewers so many
+look on by the other address, and one more that sleeps (its process is stopped while pictures come).
 """
 
 import argparse
@@ -58,15 +59,25 @@ SERVER = Path(__file__).parents[1] / "live" / "rtsp_server.py"
 # GStreamer's bindings are the system's.
 SYSTEM_PYTHON = "/usr/bin/python3"
 BUSY = "while True: pass"
-# What a page does: take each message and acknowledge it.
+# What a page does: take each message and acknowledge it. What stands before the picture names its frame: the same
+# picture sent again is no new one. The page says "no picture" after half a second; four times as long stands still.
+FROZEN_S = 2.0
 LOOKS = """
-import sys
+import json, struct, sys, time
 from urllib.parse import urlsplit
 from websockets.sync.client import connect
-at = urlsplit(sys.argv[1])
+at, seen, came_s, longest_s = urlsplit(sys.argv[1]), None, None, 0.0
 with connect(f"ws://{at.netloc}/socket?{at.query}", origin=f"http://{at.netloc}", max_size=None) as page:
     for message in page:
         if isinstance(message, bytes):
+            (length,) = struct.unpack(">I", message[:4])
+            frame = (json.loads(message[4 : 4 + length])["now"] or {}).get("frame")
+            now_s = time.monotonic()
+            if came_s is None or now_s - came_s > 1.1 * longest_s:
+                longest_s = now_s - (came_s or now_s)
+                print(longest_s, flush=True)
+            if len(message) > 4 + length and frame != seen:
+                seen, came_s = frame, now_s
             page.send('{"do": "ack"}')
 """
 
@@ -130,6 +141,7 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     last, late_bytes = len(frames) - 1, resident_bytes()
     lost = session.capture.overflowed + session.cadence.missing + (frames[last] - frames[first]) - (last - first)
     load = os.getloadavg()[0]
+    waited_s = longest_wait_s(looking[: 1 + wanted.viewers])
     for each in looking:
         each.kill()
         each.wait()
@@ -147,6 +159,7 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
             "late_p99_ms": float(p99_ms),
         }
         figures |= {"late_worst_ms": float(late_ms.max()), "core": core, "early_mb": early_bytes / 1e6}
+        figures |= {"waited_s": waited_s}
         print(json.dumps(figures | {"late_mb": late_bytes / 1e6, "period_ms": period_ms, "load": load}))
         return
     looked = f", page open, {wanted.viewers} viewers" if wanted.page else ""
@@ -158,6 +171,8 @@ def run(address: str, folder: Path, wanted: argparse.Namespace) -> None:
     told("late, median", f"{p50_ms:.1f} ms")
     told("late, 99th percentile", f"{p99_ms:.1f} ms", f"a frame, {period_ms:.1f} ms", p99_ms <= period_ms)
     told("late, worst", f"{late_ms.max():.1f} ms")
+    if looking:
+        told("longest wait of a page for a new picture", f"{waited_s:.2f} s", f"{FROZEN_S:g} s", waited_s <= FROZEN_S)
     told("share of a core", f"{100 * core:.1f} %", f"{100 * MOST_CORE:.0f} %", core <= MOST_CORE)
     grown_mb = (late_bytes - early_bytes) / 1e6
     held = f"{early_bytes / 1e6:.1f} to {late_bytes / 1e6:.1f} MB"
@@ -170,11 +185,19 @@ def looked_at(session: Session, viewers: int) -> "list[subprocess.Popen[bytes]]"
     page = Page(session, bound("127.0.0.1", 0))
     Thread(target=page.serve, args=(Event(),), daemon=True).start()
     addresses = [page.address, *[page.viewer_address] * (viewers + 1 if viewers else 0)]
-    looking = [subprocess.Popen([sys.executable, "-c", LOOKS, address]) for address in addresses]
+    looking = [subprocess.Popen([sys.executable, "-c", LOOKS, at], stdout=subprocess.PIPE) for at in addresses]
     if viewers:
         time.sleep(ASLEEP_AFTER_S)
         looking[-1].send_signal(signal.SIGSTOP)
     return looking
+
+
+def longest_wait_s(looking: "list[subprocess.Popen[bytes]]") -> float:
+    """Return the longest that any page waited for a new picture, until now, and end them."""
+    for each in looking:
+        each.kill()
+    said = [each.communicate()[0].split() for each in looking]
+    return max((float(words[-1]) if words else float("inf") for words in said), default=0.0)
 
 
 def draw(path: Path, width_px: int, height_px: int, *, in_colour: bool, wall: bool) -> None:

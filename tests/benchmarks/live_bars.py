@@ -22,6 +22,7 @@ import sys
 from typing import Any
 
 from tests.benchmarks.frame import Namespace, benchmark, told
+from tests.benchmarks.live import FROZEN_S
 
 MOST_ALONE, MOST_ADDED, MOST_GROWN_MB = 0.15, 0.03, 10.0
 
@@ -48,6 +49,8 @@ def main(chosen: Namespace) -> None:
     page, viewers = part(short, "--page"), part(short, "--page", "--viewers=4")
     added = viewers["core"] - page["core"]
     told("four viewers and a sleeping one add", f"{100 * added:+.1f} % of a core", "3 %", met=added <= MOST_ADDED)
+    waited = viewers["waited_s"]
+    told("longest wait of a page for a new picture", f"{waited:.2f} s", f"{FROZEN_S:g} s", met=waited <= FROZEN_S)
     print(f"{'with one page open, share of a core':58} {100 * page['core']:>20.1f} %")
     walls = part(short, "--page", "--record", "--wall")
     told("recording with walls: frames lost", f"{walls['lost']} of {walls['measured']}", "none", met=walls["lost"] <= 0)

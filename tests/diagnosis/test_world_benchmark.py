@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.benchmarks.world import definitions, physics
+from tests.benchmarks.hidden.catalogue_chain import RUN_START, driven
+from tests.benchmarks.world import physics
 from tests.benchmarks.world.at_rest import Parts, Reading, bidirectional, read_at_rest
+from tests.benchmarks.world.definitions import samples_of
 from tests.benchmarks.world.draw import draw_table, drawn
 from tests.benchmarks.world.error_map import draw_map
 from tests.benchmarks.world.marks import Marker
@@ -25,7 +27,7 @@ BENCHMARK = Path(__file__).resolve().parents[1] / "benchmarks" / "world"
 EXACT_MM = 1e-9
 """Rounding error of double-precision numbers over metres of travel."""
 PLAY_MM = 0.02
-OWN = ("tests.benchmarks.world", "tests.benchmarks.hidden.binomial", "tests.benchmarks.frame")
+OWN = ("tests.benchmarks.world", "tests.benchmarks.hidden", "tests.benchmarks.frame")
 
 
 def test_the_benchmark_imports_nothing_of_the_product() -> None:
@@ -99,11 +101,11 @@ def test_a_null_holds_nothing_but_its_noise() -> None:
 def test_the_judges_plays_and_sliders_are_the_generators(start: float) -> None:
     rng = np.random.default_rng(SEED)
     u = np.cumsum(rng.standard_normal(400))
-    path = InputPath.of_rows(np.arange(400.0), u, np.zeros(400, dtype=np.int64), at_rest=False)
-    play = definitions.driven(path, {"backlash": np.array([2.5])}, np.array([start]))
+    at = samples_of(InputPath.of_rows(np.arange(400.0), u, np.zeros(400, dtype=np.int64), at_rest=False))
+    play = driven(at, {"backlash": np.array([2.5]), RUN_START: np.array([start])})
     assert play == pytest.approx(physics.play(u, 2.5, start), abs=EXACT_MM)
     # An elastic slider at its limit corresponds to a play engaged by upward motion.
-    loop = definitions.driven(path, {"friction_hysteresis": np.array([0.3, 4.0])}, np.array([start]))
+    loop = driven(at, {"friction_hysteresis": np.array([0.3, 4.0]), RUN_START: np.array([start])})
     assert loop == pytest.approx(physics.friction_loop(u, 0.3, 4.0, -start), abs=EXACT_MM)
 
 

@@ -33,12 +33,15 @@ class Samples:
         Input, time since the start of the run, and time since the start of the table.
     starts : ndarray of int, shape (runs + 1,)
         First sample of each run, and n.
+    at_rest : bool
+        Whether the input steps right after each sample and rests until the next one.
     """
 
     input_mm: Array
     run_time_s: Array
     table_time_s: Array
     starts: NDArray[np.int64]
+    at_rest: bool = False
 
     def late(self, values: Array, delay_s: float) -> Array:
         """Values delayed by `delay_s`, linear between samples and constant before each run's start."""
@@ -112,12 +115,11 @@ def without_starts(acting: Effects) -> Effects:
     return {name: values for name, values in acting.items() if name not in (RUN_START, CREEP_START)}
 
 
-def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Array, Array]:
-    """Gap, midline and force at the samples; the effects act in the catalogue's order."""
+def driven(at: Samples, acting: Effects, travel_mm: tuple[float, float] = (0.0, 1.0)) -> Array:
+    """Input that the mechanism receives at the samples."""
     u = at.input_mm
     zero = np.zeros(1)
-    centred = np.zeros(len(at.starts) - 1)
-    begin = acting.get(RUN_START, centred)
+    begin = acting.get(RUN_START, np.zeros(len(at.starts) - 1))
     if "drive_lag" in acting:
         u = at.late(u, acting["drive_lag"][0])
     u = (u + acting.get("input_offset", zero)[0]) * (1 + acting.get("input_scale", zero)[0])
@@ -128,7 +130,7 @@ def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Arra
         upper, lower = acting["end_stop"]
         u = np.clip(u, lower, upper)
     if MAP in acting:
-        u = u + map_errors(u, model.travel_mm, acting[MAP])
+        u = u + map_errors(u, travel_mm, acting[MAP])
     if "slew_limit" in acting:
         u = limited(u, at.run_time_s, at.starts, acting["slew_limit"][0])
     if "backlash" in acting:
@@ -137,6 +139,14 @@ def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Arra
         u = jump(u, at.starts, acting["stick_slip"][0])
     if "friction_hysteresis" in acting:
         u = sliders(u, at.starts, *acting["friction_hysteresis"], begin)
+    return u
+
+
+def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Array, Array]:
+    """Gap, midline and force at the samples; the effects act in the catalogue's order."""
+    u = driven(at, acting, model.travel_mm)
+    zero = np.zeros(1)
+    centred = np.zeros(len(at.starts) - 1)
     rest = model.rest_gap_mm
     o = (np.interp(u, model.input_mm, model.gap_mm) - rest) * (1 + acting.get("lever_ratio_error", zero)[0])
     midline = model.placement_mm + np.interp(u, model.input_mm, model.midline_mm)
@@ -145,7 +155,7 @@ def respond(model: Simulated, at: Samples, acting: Effects) -> tuple[Array, Arra
         o = reach * np.sin(o / reach) + cross * reach * (1 - np.cos(o / reach))
     if "viscoelastic_creep" in acting:
         o = o - sum(
-            share * (o - low_pass(o, at.run_time_s, at.starts, tau, acting.get(CREEP_START, centred)))
+            share * (o - low_pass(o, at.run_time_s, at.starts, tau, acting.get(CREEP_START, centred), at.at_rest))
             for share, tau in zip(acting["viscoelastic_creep"], CREEP_TAU_S, strict=True)
         )
     if "structural_resonance" in acting:

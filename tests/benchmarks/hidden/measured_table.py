@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.benchmarks.hidden.catalogue_chain import Samples, Simulated, extended
+from tests.benchmarks.hidden.catalogue_chain import Samples
 
 Array = NDArray[np.float64]
 
@@ -44,12 +44,3 @@ def read_measured(path: Path) -> MeasuredTable:
     force = number.get("force_n", np.zeros_like(left))
     restarts = len(starts) > 2 and bool(time[starts[1]] < time[starts[1] - 1])
     return MeasuredTable(at, right - left, (left + right) / 2, force, restarts, "force_n" in number)
-
-
-def read_simulation(path: Path) -> Simulated:
-    """Read a simulation.csv of this benchmark."""
-    columns = {key: np.array(values, dtype=float) for key, values in _columns(path).items()}
-    gap = columns["gap_mm"]
-    has_edges = "left_mm" in columns
-    midline = (columns["left_mm"] + columns["right_mm"]) / 2 if has_edges else np.zeros_like(gap)
-    return extended(columns["input_mm"], gap, midline, columns.get("force_n"))

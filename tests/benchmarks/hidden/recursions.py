@@ -71,8 +71,8 @@ def sliders(u: Array, starts: NDArray[np.int64], fraction: float, reach: float, 
 
 
 @njit(cache=True)
-def low_pass(o: Array, t: Array, starts: NDArray[np.int64], tau: float, begin: Array) -> Array:
-    """First-order low-pass filter, exact for an input that is linear between samples.
+def low_pass(o: Array, t: Array, starts: NDArray[np.int64], tau: float, begin: Array, stepped: bool = False) -> Array:
+    """First-order low-pass filter, exact for an input that is linear between samples, or steps right after each.
 
     At each run's start, the filter is relaxed if `begin` is 0, and at the smallest or largest value if `begin` is -1 or
     1.
@@ -86,8 +86,9 @@ def low_pass(o: Array, t: Array, starts: NDArray[np.int64], tau: float, begin: A
         for i in range(starts[r] + 1, starts[r + 1]):
             dt = t[i] - t[i - 1]
             fade = np.exp(-dt / tau)
-            slope = (o[i] - o[i - 1]) / dt
-            out[i] = o[i] - slope * tau + (out[i - 1] - o[i - 1] + slope * tau) * fade
+            slope = 0.0 if stepped or dt == 0.0 else (o[i] - o[i - 1]) / dt
+            before = o[i] if stepped else o[i - 1]
+            out[i] = before + slope * dt - slope * tau + (out[i - 1] - before + slope * tau) * fade
     return out
 
 
@@ -103,6 +104,9 @@ def oscillator(o: Array, t: Array, starts: NDArray[np.int64], frequency_hz: floa
         out[starts[r]] = x
         for i in range(starts[r] + 1, starts[r + 1]):
             dt = t[i] - t[i - 1]
+            if dt <= 0.0:
+                out[i] = x
+                continue
             slope = (o[i] - o[i - 1]) / dt
             # The particular solution for a ramp o is o - 2 zeta slope / omega.
             lag = 2 * zeta * slope / omega

@@ -1,6 +1,6 @@
 """Benchmark of hidden effects: simulate tables, apply every method, and print a table of marks.
 
-    python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1 --methods diagnose,bic
+    python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1 --methods diagnose,ideal
 
 All results are stored under --out by seed, row and number, so that a run may be stopped and continued. All rows are
 processed in turn. With --minutes M, no table is begun after that time; --minutes 0 prints the stored results; --again
@@ -25,8 +25,6 @@ from tests.benchmarks.hidden.diagnose_adapter import Answer, diagnose, read_repo
 from tests.benchmarks.hidden.explanations import known_effects, problem_of
 from tests.benchmarks.hidden.ideal import ideal
 from tests.benchmarks.hidden.next_run_gain import Gain, gain_that_came
-from tests.benchmarks.hidden.peer_bic import greedy_bic
-from tests.benchmarks.hidden.peer_sindy import e_sindy
 from tests.benchmarks.hidden.recipe import NotDrivenError
 from tests.benchmarks.hidden.reported_effects import reported_effects
 from tests.benchmarks.hidden.rows import ROWS
@@ -35,8 +33,7 @@ from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
 from tests.benchmarks.hidden.unforeseen import widened
 from tests.benchmarks.hidden.unseen_run import unseen_error_ratio
 
-METHODS = ("diagnose", "ideal", "bic", "sindy", "gp")
-PEERS = {"bic": greedy_bic, "sindy": e_sindy}
+METHODS = ("diagnose", "ideal")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +65,7 @@ def _ask(table: JudgedTable, method: str) -> Answer:
         if method == "diagnose" and report.exists():
             return read_report(report, held["seconds"])
         return Answer(held["verdict"], tuple(frozenset(s) for s in held["sets"]), held["seconds"], held["report"])
-    if method == "diagnose":
-        answer = diagnose(table.folder)
-    else:
-        answer = ideal(table) if method == "ideal" else PEERS[method](table.folder)
+    answer = diagnose(table.folder) if method == "diagnose" else ideal(table)
     held = {"verdict": answer.verdict, "sets": [sorted(s) for s in answer.sets], "seconds": answer.seconds}
     held["report"] = answer.report if answer.verdict == "failed" else {}
     kept.write_text(json.dumps(held, indent=1), encoding="utf-8")
@@ -92,8 +86,6 @@ def work(task: Task) -> dict[str, object]:
     row, folder = ROWS[task.row], task.folder
     table = draw_table_of_row(row, task.seed, task.index, folder)
     hidden = frozenset(h.name for h in table.experiment.plant.hidden)
-    if task.method == "gp":
-        return {"unseen": unseen_error_ratio(table, None)} if row.hidden else {}
     answer = _ask(table, task.method)
     given = mark(row, widened(table, answer, hidden), answer, hidden)
     result: dict[str, object] = {"mark": asdict(given), "verdict": answer.verdict, "seconds": answer.seconds}
@@ -181,7 +173,7 @@ def _batch(tasks: list[Task]) -> list[dict[str, object]]:
 def _tell(task: Task, result: dict[str, object], misses: Path | None) -> None:
     if "fault" in result:
         print(f"{task.row} {task.index} {task.method}: {result['fault']}", flush=True)
-    missed = task.method in ("diagnose", "ideal") and "mark" in result and not result["mark"]["right"]  # type: ignore[index]
+    missed = "mark" in result and not result["mark"]["right"]  # type: ignore[index]
     if missed:
         said, hidden = result["verdict"], result["hidden"]
         print(

@@ -9,16 +9,15 @@ from tests.benchmarks.hidden.catalogue_chain import Effects, Samples, respond
 from tests.benchmarks.hidden.design import unseen_motion
 from tests.benchmarks.hidden.explanations import problem_of
 from tests.benchmarks.hidden.noise import edge_errors
-from tests.benchmarks.hidden.peer_gp import gp_prediction
 from tests.benchmarks.hidden.table_cache import JudgedTable
 
 Array = NDArray[np.float64]
 
 
-def unseen_error_ratio(table: JudgedTable, effects: Effects | None) -> float:
+def unseen_error_ratio(table: JudgedTable, effects: Effects) -> float:
     """RMS of both edges of a noisy unseen run minus the prediction, divided by the same with the judge's effects.
 
-    If `effects` is None, the Gaussian process is used instead. The midline's constant is a free parameter.
+    The midline's constant is a free parameter.
     """
     experiment = table.experiment
     rate = experiment.design.rate_hz
@@ -40,5 +39,5 @@ def unseen_error_ratio(table: JudgedTable, effects: Effects | None) -> float:
 
     # The start state of the unseen run is unknown; both predictions assume the centre.
     judge = respond(model, at, table.judgement.effects)
-    asked = gp_prediction(table.folder, at) if effects is None else respond(model, at, effects)[:2]
+    asked = respond(model, at, effects)
     return error_mm((asked[0], asked[1])) / error_mm((judge[0], judge[1]))

@@ -5,12 +5,11 @@ from itertools import product
 
 import numpy as np
 
+from tests.benchmarks.world.definitions import NEEDS_MOTION
 from tests.benchmarks.world.rig import Array, Rig
 
 WITH_START = ("backlash", "friction_hysteresis")
 """Effects whose state at the start of a run is a nuisance parameter."""
-NEEDS_MOTION = ("drive_lag", "camera_latency", "slew_limit", "structural_resonance")
-"""Effects that are excluded if the set-up rests before each reading."""
 CLOCKED = ("thermal_drift", "camera_scale_drift")
 """Effects that are excluded if the time restarts between runs."""
 OFFSETS = frozenset({"input_offset", "rest_gap_error", "edge_bias"})

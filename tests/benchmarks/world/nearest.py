@@ -12,8 +12,9 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.optimize import least_squares
 
+from tests.benchmarks.hidden.catalogue_chain import Effects
 from tests.benchmarks.world.candidates import MAP, WITH_START, Candidate, candidates
-from tests.benchmarks.world.definitions import Effects, respond
+from tests.benchmarks.world.definitions import respond
 from tests.benchmarks.world.rig import Array, Rig
 
 HOPELESS = 30.0

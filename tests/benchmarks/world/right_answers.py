@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tests.benchmarks.hidden.catalogue_chain import Effects
 from tests.benchmarks.world.candidates import MAP, OFFSETS, RATIOS, WITH_START
-from tests.benchmarks.world.definitions import Effects
 from tests.benchmarks.world.nearest import Judge
 from tests.benchmarks.world.rig import Rig
 
