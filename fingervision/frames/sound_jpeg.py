@@ -7,6 +7,8 @@ memory and ignores surplus bytes; libjpeg-turbo reports both (warnings JWRN_HIT_
 T.81, F.2.2.5 and E.2.4).
 """
 
+import re
+from collections import Counter
 from collections.abc import Iterable
 
 import simplejpeg
@@ -17,13 +19,16 @@ SMALLEST = 8
 # Number of pictures from which it is learnt whether this camera violates the format in every picture, as some cameras
 # do.
 PICTURES_TO_LEARN = 16
+# Beginning of the words about a header that cannot be read; a camera writes the same header in every picture.
+HEADER = "tjDecompressHeader"
 
 
 class SoundJpeg:
     """Checks the pictures of one Motion JPEG stream for missing or surplus data.
 
-    A fault is reported only if most pictures of the stream have none; if most have a fault, the camera itself writes
-    such pictures.
+    A camera that violates the format does so in the same way in every picture, and damage in many ways: a fault of a
+    kind that most pictures of the stream have is the camera's own, and is not reported, nor is a header that no picture
+    of the stream has better.
 
     Parameters
     ----------
@@ -33,13 +38,13 @@ class SoundJpeg:
 
     def __init__(self, codec: str) -> None:
         self._is_one = codec == "mjpeg"
-        self._sound = self._unsound = 0
+        self._kinds: Counter[str] = Counter()
 
     def learn(self, pictures: Iterable[bytes]) -> None:
         """Examine some pictures in advance, to learn which properties are usual for the stream."""
         if self._is_one:
             for picture, _ in zip(pictures, range(PICTURES_TO_LEARN), strict=False):
-                self._count(not _fault(picture))
+                self._kinds[_kind(_fault(picture))] += 1
 
     def fault(self, picture: bytes) -> str:
         """Describe a picture's fault; empty if it has none.
@@ -52,13 +57,10 @@ class SoundJpeg:
         if not self._is_one:
             return ""
         fault = _fault(picture)
-        believed = self._sound >= self._unsound
-        self._count(not fault)
-        return fault if believed else ""
-
-    def _count(self, is_sound: bool) -> None:
-        self._sound += is_sound
-        self._unsound += not is_sound
+        kind = _kind(fault)
+        self._kinds[kind] += 1
+        is_own = not self._kinds[""] if kind.startswith(HEADER) else 2 * self._kinds[kind] > self._kinds.total()
+        return "" if is_own else fault
 
 
 def _fault(picture: bytes) -> str:
@@ -67,3 +69,8 @@ def _fault(picture: bytes) -> str:
     except ValueError as error:
         return str(error).removeprefix("Corrupt JPEG data: ")
     return ""
+
+
+def _kind(fault: str) -> str:
+    """Fault without its numbers, which differ from picture to picture."""
+    return re.sub(r"\d+", "", fault)

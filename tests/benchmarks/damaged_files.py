@@ -142,7 +142,7 @@ def rows(path: Path) -> list[Row]:
     found = []
     for each in measure_in_memory(open_source(str(path)), TASK).results:
         if isinstance(each.outcome, GapMeasurement):
-            u_px = float(np.hypot(each.outcome.u_gap_px, each.outcome.u_shift_px))
+            u_px = float(np.hypot(each.outcome.u_gap_px, each.outcome.u_picture_px))
             found.append(Row(each.time_s, each.outcome.gap_px, u_px))
         else:
             found.append(Row(each.time_s, None, 0.0))

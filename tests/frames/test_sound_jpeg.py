@@ -61,6 +61,25 @@ def test_a_camera_that_breaks_the_format_in_every_picture_is_left_alone() -> Non
     assert [judge.fault(picture) for picture in pictures] == [""] * 30
 
 
+def test_damage_of_most_pictures_is_no_habit_of_the_camera() -> None:
+    judge = SoundJpeg("mjpeg")
+    rng = np.random.default_rng(7)
+    pictures = [jpeg(k) for k in range(60)]
+    for k in np.flatnonzero(rng.random(60) < 0.8):
+        at = pictures[k].index(b"\xff\xda") + 12 + int(rng.integers(400))
+        # Bytes that are missing, bytes of another picture, the end of the picture before, or no end.
+        other = pictures[(k + 7) % 60]
+        pictures[k] = (
+            pictures[k][:at] + pictures[k][at + 60 :],
+            pictures[k][:at] + other,
+            other[-300:] + pictures[k],
+            pictures[k][:at],
+        )[k % 4]
+    judge.learn(pictures)
+    whole = [jpeg(k) == picture for k, picture in enumerate(pictures)]
+    assert [not judge.fault(picture) for picture in pictures] == whole
+
+
 def test_other_codecs_are_not_judged() -> None:
     assert SoundJpeg("h264").fault(b"no picture") == ""
 
