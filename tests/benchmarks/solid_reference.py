@@ -30,9 +30,9 @@ class SolidAnswer:
     Parameters
     ----------
     force_n : float
-        Force at the drive per 1 mm of input, for small displacements.
+        Force at the drive.
     probes_mm : dict of str to (float, float)
-        Motion of each probe per 1 mm of input, at the nearest node of the middle plane.
+        Motion of each probe, at the nearest node of the middle plane.
     modes : tuple of (float, bool)
         Natural frequencies with fixed drive, each with a flag that is True for out-of-plane modes.
     """
@@ -118,8 +118,16 @@ def _on_outline(mesh: PlaneMesh) -> NDArray[np.bool_]:
     return found
 
 
-def solid_answer(mechanism: Mechanism, mesh: PlaneMesh, *, layers: int = 4, modes: int = 2) -> SolidAnswer:
-    """Run CalculiX for a unit input and for the natural frequencies.
+def solid_answer(
+    mechanism: Mechanism,
+    mesh: PlaneMesh,
+    *,
+    layers: int = 4,
+    modes: int = 2,
+    input_mm: float = 1.0,
+    large: bool = False,
+) -> SolidAnswer:
+    """Run CalculiX for one input and for the natural frequencies, if any are asked for.
 
     Parameters
     ----------
@@ -129,6 +137,10 @@ def solid_answer(mechanism: Mechanism, mesh: PlaneMesh, *, layers: int = 4, mode
         Triangles of the drawing.
     layers, modes : int
         Number of wedges through the plate, and number of natural frequencies.
+    input_mm : float
+        Motion of the drive.
+    large : bool
+        Whether the equilibrium is that of the deformed shape.
     """
     if len(mechanism.drives) > 1:
         raise ValueError("several drives are checked by their energy: tests/models/test_several_drives.py")
@@ -157,7 +169,8 @@ def solid_answer(mechanism: Mechanism, mesh: PlaneMesh, *, layers: int = 4, mode
     kept = [f"DRIVE,{3 - along},{3 - along}"] if across else []
     spread = np.ptp(body.nodes_mm[drive - 1][:, :2], axis=0)
     in_mean = not across and (driven.turns == "free" or spread[along - 1] > _ON * size_mm)
-    pushed, reacting = f"DRIVE,{along},{along},{sign:g}", ["DRIVE"]
+    moved_by = f"{along},{along},{sign * input_mm:.12g}"
+    pushed, reacting = f"DRIVE,{moved_by}", ["DRIVE"]
     unequal = list(lines)
     if in_mean:
         if any(axis == along for axis in axes):
@@ -167,18 +180,22 @@ def solid_answer(mechanism: Mechanism, mesh: PlaneMesh, *, layers: int = 4, mode
         lines[1:1] = [f"{count},0,0,0"]
         lines += ["*EQUATION", f"{len(weights) + 1}", *(f"{node},{along},{w:.12g}" for node, w in weights)]
         lines += [f"{count},{along},-1"]
-        pushed, reacting = f"{count},{along},{along},{sign:g}", [f"FIXED{i}" for i in range(len(mechanism.fixed))]
+        pushed, reacting = (
+            f"{count},{along},{along},{sign * input_mm:.12g}",
+            [f"FIXED{i}" for i in range(len(mechanism.fixed))],
+        )
     # Nodes of the middle plane stay in this plane; otherwise a body with sliding faces only could drift away.
-    static = ["*STEP", "*STATIC", "*BOUNDARY", pushed, "DRIVE,3,3", *kept, "*NODE PRINT, NSET=WATCHED", "U"]
+    static = ["*STEP, NLGEOM", "*STATIC", "0.5,1."] if large else ["*STEP", "*STATIC"]
+    static += ["*BOUNDARY", pushed, "DRIVE,3,3", *kept, "*NODE PRINT, NSET=WATCHED, FREQUENCY=100", "U"]
     for name in reacting:
-        static += [f"*NODE PRINT, NSET={name}, TOTALS=ONLY", "RF"]
+        static += [f"*NODE PRINT, NSET={name}, TOTALS=ONLY, FREQUENCY=100", "RF"]
     static += ["*END STEP"]
     vibrating = ["*BOUNDARY", "DRIVE,1,3", "*STEP", "*FREQUENCY", f"{modes}", "*NODE FILE", "U", "*END STEP"]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         moved, force = _static(_run(folder, "static", [*lines, *static], ".dat"), -sign if in_mean else sign, along)
-        text = _run(folder, "modes", [*unequal, *vibrating], ".dat")
-        shapes = (folder / "modes.frd").read_text(encoding="ascii", errors="replace")
+        text = _run(folder, "modes", [*unequal, *vibrating], ".dat") if modes else ""
+        shapes = (folder / "modes.frd").read_text(encoding="ascii", errors="replace") if modes else ""
     frequencies = _frequencies(text)
     out = _out_of_plane(shapes, len(body.nodes_mm), len(frequencies))
     probes = {name: moved[node] for name, node in watched.items()}

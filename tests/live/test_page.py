@@ -4,13 +4,9 @@ import csv
 import io
 import json
 import re
-import subprocess
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from urllib.error import HTTPError
-from urllib.request import Request, urlopen
 
 import cv2
 import numpy as np
@@ -19,9 +15,10 @@ import pytest
 from fingervision.live.page_socket import STATE_EVERY_S
 from fingervision.live.session import SILENT_S
 from tests.live.browser import PATIENCE_MS, browser, drag, needs_chromium, opened, says, shown
-from tests.waiting import until
 
 __all__ = ["browser", "opened"]
+from tests.waiting import until
+
 pytestmark = needs_chromium
 # What the page shows has four decimals, the table seven.
 SHOWN_MM = 0.00005
@@ -252,95 +249,3 @@ def test_a_cut_is_said_within_a_second_and_measuring_resumes(
     camera.start()
     says(page, "The source is back")
     shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")
-
-
-@pytest.mark.slow
-def test_a_recording_that_ends_by_itself_is_in_view(
-    live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
-) -> None:
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(disk)], capture_output=True, text=True, check=False
-    )
-    if mounted.returncode:
-        pytest.skip(f"a small disk cannot be mounted here: {mounted.stderr.strip()}")
-    try:
-        view = live("simulated", "--port", "0", out=disk / "runs")
-        page = opened(view.address, viewport={"width": 1280, "height": 800})
-        shown(page, "Number(document.querySelector('#picture').dataset.shown) > 5")
-        chart = page.locator("#chart").bounding_box()
-        assert chart["y"] + chart["height"] <= 800  # the chart is in view
-        page.locator("body").press("r")
-        page.locator("#alarm", has_text="Recording has ended").wait_for()
-        box = page.locator("#alarm").bounding_box()
-        assert box["y"] >= 0
-        assert box["y"] + box["height"] <= 800
-        assert page.locator("#alarm", has_text="No space left on device").is_visible()
-        assert page.inner_text("#record") != "Stop"
-        page.wait_for_timeout(500)  # it stays, and measuring goes on
-        assert page.locator("#alarm", has_text="Recording has ended").is_visible()
-        assert view.stop() == 1
-    finally:
-        subprocess.run(["umount", "-l", str(disk)], check=True)
-
-
-@pytest.mark.slow
-def test_a_zeroed_value_says_so_and_its_tolerance_and_table_agree(
-    live: Callable[..., Any], opened: Callable[..., Any]
-) -> None:
-    view = live("simulated", "--port", "0")
-    page = opened(view.address)
-    shown(page, "document.querySelector('#status').textContent === 'ok'")
-    page.click("#zero")
-    page.locator("#zeroed", has_text="less zero").wait_for()
-    # Gaps less a zero lie between -3 and 3 mm here: a tolerance of real gaps would fail, this one passes.
-    page.fill("#least", "-3.5")
-    page.fill("#greatest", "3.5")
-    page.press("#greatest", "Enter")
-    page.locator("#verdict", has_text="pass").wait_for()
-    page.fill("#px_per_mm", "20")
-    page.press("#px_per_mm", "Enter")
-    says(page, "The zero was removed")
-    shown(page, "document.querySelector('#zeroed').hidden")
-
-
-@pytest.mark.slow
-def test_strangers_are_refused(live: Callable[..., Any], browser: Any) -> None:
-    view = live("simulated", "--port", "0")
-    address = view.address
-    origin, token = re.match(r"(http://[^/]+)/\?token=(.*)", address).groups()
-
-    def status(path: str, **headers: str) -> int:
-        try:
-            with urlopen(Request(origin + path, headers=headers)) as answer:
-                return int(answer.status)
-        except HTTPError as error:
-            return error.code
-
-    assert status(f"/?token={token}") == 200
-    assert [status(path) for path in ("/", "/?token=wrong", "/gaps.csv", "/steps/0.png")] == [403] * 4
-    assert status(f"/?token={token}", Host="evil.example") == 400
-    assert status(f"/?token={token}", Origin="http://evil.example") == 403
-    assert status(f"/page/..%2f..%2fsession.py?token={token}") == 404
-    with urlopen(address) as answer:
-        assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
-        assert "Access-Control-Allow-Origin" not in answer.headers
-
-    from websockets.exceptions import ConnectionClosed, InvalidStatus
-    from websockets.sync.client import connect
-
-    socket = origin.replace("http", "ws") + "/socket"
-    with_token = f"{socket}?token={token}"
-    for target, own in ((socket, origin), (with_token, "http://evil.example"), (with_token, None)):
-        with pytest.raises(InvalidStatus) as refused:
-            connect(target, origin=own)
-        assert refused.value.response.status_code == 403
-    with connect(with_token, origin=origin) as page:
-        page.send('{"do": "read", "path": "/etc/passwd"}')
-        answers = (page.recv() for _ in range(20))
-        refusal = next(json.loads(each) for each in answers if isinstance(each, str))
-        assert refusal["refused"].startswith("A request of the browser page must be one of bed_home, bed_jog,")
-        page.send("x" * 10_000)
-        with pytest.raises(ConnectionClosed):
-            deque(iter(page.recv, None), maxlen=0)

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingervision.domain.errors import DataError
 from fingervision.domain.region import Region
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.finger import EllipticTip, finger_shape, half_ellipse
@@ -54,13 +53,6 @@ def test_a_mapped_outline_follows_the_mapped_points(k1: float, k2: float, about_
         assert np.max(distance_px(mapped.pieces, seen.points(piece.points(t)))) < MAPPED_PX
 
 
-def test_no_tilt_and_no_lens_change_nothing() -> None:
-    points = np.array([[0.0, 0.0], [639.0, 479.0], [100.0, 300.0]])
-    assert np.max(np.abs(view().points(points) - points)) < ROUNDING_PX
-    outlines = (polygon(((10.0, 10.0), (20.0, 10.0), (20.0, 30.0))),)
-    assert Camera().sees(outlines, 640, 480) is outlines
-
-
 def test_the_corner_moves_by_k1_and_the_centre_stays() -> None:
     seen = view(RadialLens(k1=-0.05))
     assert np.max(np.abs(seen.points(CENTRE) - CENTRE)) < ROUNDING_PX
@@ -81,16 +73,6 @@ def test_a_tilted_plane_keeps_lines_straight_and_shrinks_with_depth() -> None:
     # Negative about y moves the right part nearer: it looks larger.
     sides = seen.points(np.array([[100.0, 200.0], [100.0, 280.0], [540.0, 200.0], [540.0, 280.0]]))
     assert np.hypot(*(sides[3] - sides[2])) > np.hypot(*(sides[1] - sides[0]))
-
-
-def test_blooming_is_the_same_everywhere_in_the_picture_whatever_the_lens() -> None:
-    """The edge bias acts on the sensor, behind the lens: the area in the picture grows by perimeter times bias."""
-    seen = view(RadialLens(-0.1), Tilt(15.0, 15.0, 1500.0))
-    mapped = seen.outline(polygon(((80.0, 60.0), (500.0, 30.0), (600.0, 430.0), (120.0, 400.0)), (20.0,) * 4))
-    perimeter = sum(piece.length_px for piece in mapped.pieces)
-    grown = mapped.grown(0.3)
-    # Every corner is round: Steiner's formula.
-    assert grown.area_px2 == pytest.approx(mapped.area_px2 + 0.3 * perimeter + np.pi * 0.09, abs=1e-4)
 
 
 def test_biarcs_close_in_on_a_curve_with_the_third_power_of_the_spacing() -> None:
@@ -120,16 +102,3 @@ def test_what_the_camera_sees_is_drawn_where_it_lies() -> None:
     (seen,) = camera.sees((polygon(((200.0, 100.0), (400.0, 120.0), (420.0, 300.0), (190.0, 330.0))),), 640, 480)
     drawn = coverage([seen], 0.9, Region(0, 0, 640, 480))
     assert drawn.sum() == pytest.approx(seen.area_px2, abs=1e-3)
-
-
-def test_refusals_say_what_must_be() -> None:
-    with pytest.raises(
-        DataError,
-        match=r"must be invertible within 1.5 half diagonals of the frame, but k1 = -0.5 "
-        "with k2 = 0",
-    ):
-        RadialLens(k1=-0.5)
-    with pytest.raises(DataError, match=r"at most 45 degrees, seen from a positive distance, but is 60"):
-        Tilt(about_x_deg=60.0)
-    with pytest.raises(DataError, match=r"from -1 px"):
-        Tilt(distance_px=-1.0)

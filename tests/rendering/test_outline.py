@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingervision.domain.errors import DataError
 from fingervision.rendering.outline import Arc, Line, Motion, Outline, disc
 from fingervision.rendering.polygon import polygon
 
@@ -77,18 +76,3 @@ def test_parts_of_a_piece_meet() -> None:
         assert front.end == pytest.approx(back.start)
         assert front.length_px + back.length_px == pytest.approx(piece.length_px)
         assert piece.backwards().start == pytest.approx(piece.end)
-
-
-def test_refusals_say_what_must_be() -> None:
-    with pytest.raises(DataError, match=r"must be closed, but a piece ends 1 px away"):
-        Outline((Line(0.0, 0.0, 1.0, 0.0),))
-    with pytest.raises(DataError, match=r"radius must be 0 or more, but is -1 px"):
-        polygon(CONVEX, (-1.0, 0.0, 0.0, 0.0, 0.0))
-    with pytest.raises(DataError, match=r"radii must fit on the side between them.*at most half the width"):
-        polygon(((0.0, 0.0), (10.0, 0.0), (10.0, 50.0), (0.0, 50.0)), (6.0, 6.0, 0.0, 0.0))
-    with pytest.raises(DataError, match=r"at least 3 corners, but has 2"):
-        polygon(((0.0, 0.0), (1.0, 0.0)))
-    with pytest.raises(DataError, match=r"sides must have a length, but the shortest has 0 px"):
-        polygon(((0.0, 0.0), (0.0, 0.0), (1.0, 1.0)))
-    with pytest.raises(DataError, match=r"radius_px of a disc must be positive, but is -2"):
-        disc(0.0, 0.0, -2.0)

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingervision.domain.errors import DataError
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera
 from fingervision.rendering.picture import exact_grey, render
 from fingervision.rendering.scene import Patch, Scene
@@ -55,12 +54,3 @@ def test_opencv_finds_the_corners_of_a_chessboard_where_they_are(turn_deg: float
     true = np.stack([318.2 + x * np.cos(turn) - y * np.sin(turn), 241.6 + x * np.sin(turn) + y * np.cos(turn)], axis=-1)
     distance = np.linalg.norm(refined[:, None] - true.reshape(-1, 2)[None], axis=-1).min(axis=1)
     assert distance.max() < CORNER_PX
-
-
-def test_refusals_say_what_must_be() -> None:
-    with pytest.raises(DataError, match=r"size_px must be positive, but is 0"):
-        bar(0.0, 100.0, x_px=0.0, y_px=0.0)
-    with pytest.raises(DataError, match=r"square_px must be positive, but is -3"):
-        chessboard((9, 6), -3.0, x_px=0.0, y_px=0.0)
-    with pytest.raises(DataError, match=r"A slot must lie inside its plate.*choose a shorter slot"):
-        slot(100.0, 900.0, x_px=320.0, y_px=240.0)

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import DataError
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.rendering.camera import IDEAL_CAMERA, Camera
@@ -147,16 +146,6 @@ def test_other_tips_have_their_gap_too(tip: SquareTip | EllipticTip) -> None:
     assert true_gap(two_fingers(80.0, tip=tip, tilt_deg=3.0)).gap_px == pytest.approx(80.0, abs=TRUTH_PX)
 
 
-def test_a_half_circle_is_an_ellipse_of_equal_axes() -> None:
-    round_gap = two_fingers(80.0, radius_px=51.0).fingers[0].outline.box_px[2]
-    elliptic = max(
-        point[0]
-        for piece in two_fingers(80.0, tip=EllipticTip(51.0)).fingers[0].outline.pieces
-        for point in [piece.end]
-    )
-    assert elliptic == pytest.approx(round_gap, abs=1e-3)
-
-
 def test_different_tip_heights_make_the_gap_slanted() -> None:
     true = true_gap(two_fingers(50.0, tip_step_px=30.0))
     assert true.right.x_px - true.left.x_px == pytest.approx(40.0, abs=TRUTH_PX)
@@ -187,47 +176,3 @@ def test_where_there_is_no_gap_there_is_a_reason(scene: Scene, status: Status) -
     assert isinstance(found, NoGap)
     assert found.status is status
     assert found.words.endswith(".")
-
-
-def test_refusals_say_what_must_be() -> None:
-    with pytest.raises(DataError, match=r"at least the step between the tips \(30 px\), but is 20"):
-        two_fingers(20.0, tip_step_px=30.0)
-    with pytest.raises(DataError, match=r"Every size and tilt of two fingers must be a finite number"):
-        two_fingers(float("nan"))
-    with pytest.raises(DataError, match=r"below_tip_px must lie between 0 and the finger's length, but is -1"):
-        two_fingers(20.0, below_tip_px=-1.0)
-    with pytest.raises(DataError, match=r"tilt must be at most 45 degrees, but is 90: choose another direction"):
-        two_fingers(20.0, tilt_deg=90.0)
-    with pytest.raises(DataError, match=r"slant must be at most 45 degrees, but is 80"):
-        two_fingers(20.0, tip=SquareTip(slant_deg=80.0))
-    up, left = two_fingers(20.0), two_fingers(20.0, direction=Direction.LEFT)
-    with pytest.raises(
-        DataError,
-        match=r"must have two fingers that point in the same direction, but the directions "
-        "are up, left",
-    ):
-        truth(replace(up, fingers=(up.fingers[0], left.fingers[0])), IDEAL_CAMERA, BELOW_TIP_PX)
-    with pytest.raises(DataError, match=r"width and length must be positive, but are 0 px and"):
-        two_fingers(20.0, width_px=0.0)
-    with pytest.raises(DataError, match=r"at most half the width"):
-        two_fingers(20.0, width_px=40.0, radius_px=21.0)
-    with pytest.raises(DataError, match=r"height must lie between 0 and the finger's length, but is 0 px"):
-        two_fingers(20.0, tip=EllipticTip(0.0))
-
-
-@pytest.mark.slow
-@settings(deadline=None)
-@given(
-    tilt_deg=st.floats(-10.0, 10.0),
-    radius_px=st.floats(11.0, 50.0),
-    direction=st.sampled_from(list(Direction)),
-)
-def test_no_point_of_the_outline_lies_beyond_the_tip(tilt_deg: float, radius_px: float, direction: Direction) -> None:
-    """A dense sampling of the outline, for every small tilt: the outermost point may lie near the end of an arc."""
-    scene = two_fingers(gap_px=200.0, tilt_deg=tilt_deg, radius_px=radius_px, direction=direction)
-    found = true_gap(scene)
-    axis = 1 if direction.is_vertical else 0
-    outward = -1.0 if direction in (Direction.UP, Direction.LEFT) else 1.0
-    for finger, edge in zip(scene.fingers, (found.left, found.right), strict=True):
-        places = np.concatenate([np.asarray(piece.points(np.linspace(0, 1, 4001))) for piece in finger.outline.pieces])
-        assert np.max(outward * places[:, axis]) == pytest.approx(outward * edge.tip_px, abs=1e-4)
