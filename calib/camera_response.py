@@ -8,6 +8,7 @@ the blur.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +82,12 @@ class CameraResponse:
                 f"The levels of the camera response {self.name} must extend from 0 to full scale, but extend from "
                 f"{level[0]:.3g} to {level[-1]:.3g} of full scale."
             )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """In another process, a standard response is again the one that `standard_response` returns."""
+        if self.name in CURVES and self is standard_response(self.name):
+            return standard_response, (self.name,)
+        return CameraResponse, (self.name, self.level, self.light, self.top_level, self.white)
 
     def table(self, top_level: int, size: int, highest: int | None = None) -> Floats:
         """Light for every stored level, on the scale of the levels: 0 gives 0, full scale gives full scale.

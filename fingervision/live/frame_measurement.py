@@ -1,16 +1,17 @@
 """Measurement of single frames of a live view, and their table rows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ParamSpec, TypeVar
 
 from fingervision.domain.camera import CameraModel, Origin
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.live.choices import Choices
 from fingervision.live.run_folder import RunFolder
-from fingervision.measuring.camera_learning import WANTED, camera_of
+from fingervision.measuring.camera_learning import WANTED, camera_beside
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.task import Task
@@ -18,23 +19,32 @@ from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.defect_pixels import repaired
 from fingervision.vision.pipeline import Settings, measure_frame
 
-# The camera of a live view, learnt while frames arrive: assumed at first, known after a dozen frames with a gap.
+P = ParamSpec("P")
+T = TypeVar("T")
+
+# The camera of a live view, learnt while frames arrive: assumed at first, known after a dozen frames with a gap. Frames
+# that were measured before are measured again by the camera that was learnt, so that all rows have the same; they
+# are kept until then, up to this number of pixels.
+MOST_KEPT_PX = 150_000_000
 
 
 class LiveCamera:
-    """Learns the camera in a thread of its own, so that no frame waits for it.
+    """Learns the camera beside the measurement, so that no frame waits for it.
 
     Parameters
     ----------
     tell : callable
         Called with a sentence once the camera is known, or is known not to be learnable.
+    again : callable
+        Called in a thread of its own, once the camera is known, with the frames before and how to measure them.
     """
 
-    def __init__(self, tell: Callable[[str], None] = lambda words: None) -> None:
-        self._tell, self._told = tell, ""
+    def __init__(self, tell: Callable[[str], None], again: Callable[[Sequence[Frame], Settings, Task], None]) -> None:
+        self._tell, self._told, self._again = tell, "", again
         self._key: tuple[object, object] = (None, None)
         self._frames: list[Frame] = []
         self._learning: Future[CameraModel] | None = None
+        self._measuring: Future[None] | None = None
         self._camera: CameraModel | None = None
 
     def used(self, settings: Settings, task: Task, run: RunFolder | None) -> Settings:
@@ -46,23 +56,27 @@ class LiveCamera:
             self._key, self._frames, self._learning, self._camera = (task.scale, task.response), [], None, None
         camera = None if run is None else run.camera
         if camera is not None:
-            self._frames, self._learning = [], None
+            self._learning = None
         elif self._learning is not None and self._learning.done():
             camera, self._learning = self._learning.result(), None
-        if camera is not None and camera is not self._camera:
-            self._know(camera)
-        return settings if self._camera is None else replace(settings, camera=self._camera)
+        if self._measuring is not None and self._measuring.done():
+            self._measuring.result()  # raises what failed there
+        if camera is None or camera is self._camera:
+            return settings if self._camera is None else replace(settings, camera=self._camera)
+        self._know(camera)
+        settings, frames, self._frames = replace(settings, camera=camera), self._frames, []
+        if frames:
+            self._measuring = _in_a_thread(self._again, frames, settings, task)
+        return settings
 
-    def add(self, frame: Frame, settings: Settings, task: Task) -> None:
-        """Add a frame with a gap; enough frames start the learning."""
-        if self._camera is not None or self._learning is not None:
+    def add(self, frame: Frame, settings: Settings, task: Task, *, learns: bool) -> None:
+        """Add a frame with a gap; enough frames start the learning, unless another learns."""
+        if self._camera is not None:
             return
-        self._frames.append(replace(frame, pixels=frame.pixels.copy()))
-        if len(self._frames) >= WANTED:
-            frames, self._frames = self._frames, []
-            pool = ThreadPoolExecutor(1, "camera")
-            self._learning = pool.submit(camera_of, frames, settings, task.scale)
-            pool.shutdown(wait=False)
+        if (len(self._frames) + 1) * frame.pixels.size < MOST_KEPT_PX or len(self._frames) < WANTED:
+            self._frames.append(replace(frame, pixels=frame.pixels.copy()))
+        if learns and self._learning is None and len(self._frames) >= WANTED:
+            self._learning = _in_a_thread(camera_beside, self._frames[-WANTED:], settings, task.scale)
 
     def _know(self, camera: CameraModel) -> None:
         self._camera = camera
@@ -70,6 +84,13 @@ class LiveCamera:
         if words and words != self._told:
             self._told = words
             self._tell(words)
+
+
+def _in_a_thread(work: Callable[P, T], *given: P.args, **named: P.kwargs) -> "Future[T]":
+    pool = ThreadPoolExecutor(1, "camera")
+    found = pool.submit(work, *given, **named)
+    pool.shutdown(wait=False)
+    return found
 
 
 def _in_words(camera: CameraModel) -> str:
@@ -115,6 +136,8 @@ class FrameMeasurement:
         Whether the fingers are darker than the background; None to detect this in every frame.
     tell : callable
         Called with a sentence once the camera has been learnt.
+    again : callable
+        Called in a thread of its own, once the camera has been learnt, with new rows of the frames with a gap before.
     """
 
     def __init__(
@@ -123,9 +146,11 @@ class FrameMeasurement:
         files: tuple[Path, ...] = (),
         fingers_are_dark: bool | None = None,
         tell: Callable[[str], None] = lambda words: None,
+        again: Callable[[Sequence[GapRow]], None] = lambda rows: None,
     ) -> None:
         self._frame_size_px, self._files, self._fingers_are_dark = frame_size_px, files, fingers_are_dark
-        self._pictures, self._camera = SoundPictures(), LiveCamera(tell)
+        self._pictures, self._camera = SoundPictures(), LiveCamera(tell, self._measure_again)
+        self._take_again = again
         self.settings: Settings | None = None
         """Settings with which the last frame was measured."""
 
@@ -171,6 +196,13 @@ class FrameMeasurement:
         self.settings = settings
         frame = repaired(frame, settings.camera)
         outcome = self._pictures.judged(frame, measure_frame(frame, settings))
-        if isinstance(outcome, GapMeasurement) and run is None:
-            self._camera.add(frame, settings, choices.task)
+        if isinstance(outcome, GapMeasurement):
+            self._camera.add(frame, settings, choices.task, learns=run is None)
         return outcome
+
+    def _measure_again(self, frames: Sequence[Frame], settings: Settings, task: Task) -> None:
+        found = [
+            Result(frame.index, frame.time_s, measure_frame(repaired(frame, settings.camera), settings))
+            for frame in frames
+        ]
+        self._take_again(RowMaker(task.scale, self._frame_size_px).rows(found))

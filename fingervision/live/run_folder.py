@@ -14,6 +14,7 @@ from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.received import OwnPacket
 from fingervision.frames.source import Description
+from fingervision.measuring.camera_learning import camera_beside
 from fingervision.measuring.run_table import Measured, RunTable
 from fingervision.measuring.task import Task
 from fingervision.storage.calibration_json import write_calibration
@@ -73,7 +74,7 @@ class RunFolder:
         self._lost = LostFrames(self.path / LOST)
         self._video = RecordedVideo(self.path / VIDEO, template)
         self._rows = GapsCsv(self.path / GAPS)
-        self._table = RunTable(replace(description, files=(self.path / VIDEO,)), task, self._rows.add)
+        self._table = RunTable(replace(description, files=(self.path / VIDEO,)), task, self._rows.add, camera_beside)
         self._last_s = 0.0
         self.event("recording", "Recording began.")
 

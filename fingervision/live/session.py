@@ -2,7 +2,7 @@
 
 import secrets
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, replace
 from pathlib import Path
 from threading import Event, Lock, Thread
@@ -55,11 +55,15 @@ class History:
 
     def add(self, row: GapRow) -> None:
         """Add a row; if the buffer is full, the oldest row is dropped."""
-        cells = [*astuple(row)[:COLUMNS_KEPT], row.input_mm, row.force_n]
-        cells[2] = STATUSES.index(row.status)
         with self._lock:
-            self._cells[self.count % len(self._cells)] = [np.nan if cell is None else cell for cell in cells]
+            self._cells[self.count % len(self._cells)] = _cells(row)
             self.count += 1
+
+    def replace(self, rows: Sequence[GapRow]) -> None:
+        """Replace the rows of some frames; their input and force stay."""
+        with self._lock:
+            for row in rows:
+                self._cells[self._cells[:, 0] == row.frame, :COLUMNS_KEPT] = _cells(row)[:COLUMNS_KEPT]
 
     @property
     def oldest(self) -> int:
@@ -76,6 +80,12 @@ class History:
             cells: list[Any] = [None if cell != cell else cell for cell in (time_s, *numbers)]
             row = GapRow(int(frame), cells[0], STATUSES[int(status)], *cells[1:-2])
             yield row if cells[-2] is None else replace(row, input_mm=cells[-2], force_n=cells[-1])
+
+
+def _cells(row: GapRow) -> list[float]:
+    cells = [*astuple(row)[:COLUMNS_KEPT], row.input_mm, row.force_n]
+    cells[2] = STATUSES.index(row.status)
+    return [np.nan if cell is None else cell for cell in cells]
 
 
 # Check of the illumination in the picture: overexposed, too dark, or fluctuating.
@@ -161,7 +171,9 @@ class Session:
         self.driven_at: DrivenAt = lambda time_s: None
         """Function that returns the gripper's input at a time of this view, if the source gives no input."""
         self._measurement = FrameMeasurement(
-            (self.description.width_px, self.description.height_px), tell=lambda words: self.say("camera", words)
+            (self.description.width_px, self.description.height_px),
+            tell=lambda words: self.say("camera", words),
+            again=self._replace,
         )
         self._frame_at_s = monotonic()
         self._interrupted, self._run = False, ""
@@ -352,6 +364,11 @@ class Session:
         recorder = self._recorder
         lags = self.capture.waiting.qsize() > FRAMES_UNTIL_HURRY
         return lags or (recorder is not None and recorder.in_a_hurry)
+
+    def _replace(self, rows: Sequence[GapRow]) -> None:
+        """Replace rows that were measured before the camera was known; pages read all rows again."""
+        self.history.replace(rows)
+        self.identity = secrets.token_hex(4)
 
     def _measure(self) -> None:
         while not self._stopped.is_set():

@@ -17,7 +17,7 @@ from fingervision.frames.camera_settings import coding_of
 from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import Description
 from fingervision.measuring.beside_damage import confirmed_beside_damage
-from fingervision.measuring.camera_learning import learnt_first
+from fingervision.measuring.camera_learning import Learn, learnt_first
 from fingervision.measuring.frame_sequence import Judged, in_sequence
 from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.marked import marked
@@ -199,6 +199,7 @@ def measure_frames(
     see_item: SeeItem | None = None,
     on_progress: Progress | None = None,
     measure: MeasureFrame | None = None,
+    learn: Learn | None = None,
 ) -> bool:
     """Measure a recording from its first frame to its last.
 
@@ -218,6 +219,8 @@ def measure_frames(
         Called at intervals with the number of frames done and the number that the source announces.
     measure : callable or None
         Measurement of one frame after the camera has been learnt, if not `measure_frame`.
+    learn : callable or None
+        What learns the camera from the first frames, if not `camera_of`.
 
     Returns
     -------
@@ -247,7 +250,7 @@ def measure_frames(
         stack.callback(hand_over)
         handed_over_at = monotonic()
         try:
-            for item, outcome in _outcomes(items, how, series, asked.is_set, measure):
+            for item, outcome in _outcomes(items, how, series, asked.is_set, measure, learn):
                 result = Result(item.index, item.time_s, outcome)
                 pending.append(result)
                 if see_item is not None:
@@ -271,6 +274,7 @@ def _outcomes(
     series: GapSeries,
     is_stopped: Callable[[], bool],
     measure: MeasureFrame | None,
+    learn: Learn | None,
 ) -> Iterator[tuple[Frame | LostFrame, GapMeasurement | NoGap | LostFrame]]:
     """Yield every frame with its result; the decoder runs ahead, and stops when this generator is closed."""
     pictures = SoundPictures()
@@ -285,7 +289,7 @@ def _outcomes(
 
     with closing(decoded_ahead(source)) as frames:
         first, series.camera = learnt_first(
-            coded(frames, how.description.coding), how.settings, how.row_maker.scale, is_stopped
+            coded(frames, how.description.coding), how.settings, how.row_maker.scale, is_stopped, learn
         )
         seen = (repaired(item, series.camera) if isinstance(item, Frame) else item for item in first)
         yield from with_lag(confirmed_beside_damage(in_sequence(judged(seen))), series.camera.lag)

@@ -16,6 +16,7 @@ from fingervision.domain.camera import CameraModel
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.frames.source import Description
+from fingervision.measuring.camera_learning import Learn
 from fingervision.measuring.frame_loop import measure_frames, prepared
 from fingervision.measuring.rows import Result
 from fingervision.measuring.series import GapSeries
@@ -42,10 +43,18 @@ class RunTable:
         Settings of the measurement.
     take : callable
         Called with the rows, in order, in the thread; an error that it raises is raised by `add` and `close`.
+    learn : callable or None
+        What learns the camera; `camera_beside` where frames come meanwhile.
     """
 
-    def __init__(self, description: Description, task: Task, take: Callable[[Sequence[GapRow]], None]) -> None:
-        self._description, self._task, self._take_rows = description, task, take
+    def __init__(
+        self,
+        description: Description,
+        task: Task,
+        take: Callable[[Sequence[GapRow]], None],
+        learn: Learn | None = None,
+    ) -> None:
+        self._description, self._task, self._take_rows, self._learn = description, task, take, learn
         self.camera: CameraModel | None = None
         """Camera of the recording; None until it is learnt."""
         self._waiting: Queue[Frame | LostFrame | None] = Queue(
@@ -92,7 +101,12 @@ class RunTable:
             # The frames come with their marks, which are in lost.csv for those who read the video.
             how = replace(how, description=replace(how.description, files=()))
             measure_frames(
-                chain((first,), iter(self._waiting.get, None)), how, GapSeries(), self._take, measure=self._outcome
+                chain((first,), iter(self._waiting.get, None)),
+                how,
+                GapSeries(),
+                self._take,
+                measure=self._outcome,
+                learn=self._learn,
             )
         except Exception as error:  # raised where the next frame is added
             self._failure = error

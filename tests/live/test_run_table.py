@@ -9,14 +9,17 @@ import numpy as np
 from calib.calibration import BareScale
 from fingervision.domain.camera import Origin
 from fingervision.domain.frame import Coding, Frame
+from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.source import Description, open_source
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import FrameMeasurement
 from fingervision.live.run_folder import RecordedFrame, RunFolder
+from fingervision.live.session import History
 from fingervision.measuring.camera_learning import WANTED
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
+from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.pipeline import measure_frame
 
 COUNT, SIZE_PX, SCALE = 40, (160, 120), 17.0
@@ -53,6 +56,31 @@ def test_a_camera_that_is_being_learnt_when_a_run_begins_is_used_until_the_run_h
     run.close("The test ended.")
     assert view.settings.camera.response.origin is Origin.LEARNT
     assert run.camera is None
+
+
+def test_rows_before_the_camera_is_known_are_measured_again_by_it() -> None:
+    again: list[GapRow] = []
+    view, choices, history = FrameMeasurement(SIZE_PX, again=again.extend), Choices(BareScale(SCALE)), History()
+    task = choices.task
+    assert task is not None
+    frames: dict[int, Frame] = {}
+    until_s = monotonic() + PATIENCE_S
+    while not again and monotonic() < until_s:
+        frame = replace(frame_of(len(frames) % COUNT), index=len(frames))
+        frames[frame.index] = frame
+        _, _, row = view.measured(frame, choices)
+        assert row is not None
+        history.add(replace(row, input_mm=0.25))
+        sleep(0.02)
+    history.replace(again)
+    assert view.settings is not None
+    assert view.settings.camera.response.origin is Origin.LEARNT
+    assert len(again) >= WANTED
+    for row in history.rows():
+        found = measure_frame(frames[row.frame], view.settings)
+        assert isinstance(found, GapMeasurement)
+        assert row.gap_px == found.gap_px
+        assert row.input_mm == 0.25
 
 
 def test_a_run_whose_camera_becomes_known_on_the_way_has_the_table_of_its_video(tmp_path: Path) -> None:

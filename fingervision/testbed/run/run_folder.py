@@ -19,6 +19,7 @@ from fingervision.domain.frame import Frame
 from fingervision.domain.model import Model
 from fingervision.domain.recipe import Recipe
 from fingervision.frames.video_file import VideoFile
+from fingervision.measuring.camera_learning import camera_beside
 from fingervision.measuring.run_table import Measured, RunTable
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.durable import remove_empty
@@ -233,7 +234,8 @@ class BedRunFolder:
             if bed.model is not None and SIMULATION not in kept:
                 write_expected(path / SIMULATION, bed.model, bed.limits)
             self._samples = SamplesCsv(path / SAMPLES, tuple(bed.channels), go_on=bool(self.rows))
-            self.table = RunTable(replace(sight.camera.description, files=(path / VIDEO,)), sight.task, self._take)
+            description = replace(sight.camera.description, files=(path / VIDEO,))
+            self.table = RunTable(description, sight.task, self._take, None if bed.replays else camera_beside)
             if self.rows:
                 # The camera is learnt from the first frames, and each frame is judged by those before it.
                 for item in islice(VideoFile(str(path / VIDEO)), len(self.rows)):
