@@ -13,15 +13,18 @@ https://blueskyproject.io/bluesky/main/hardware.html. The adapter needs the extr
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, DeviceError, LimitError, StateError
+from fingervision.domain.frame import Frame
+from fingervision.measuring.camera_learning import WANTED, camera_beside
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.clocks.clock import VirtualClock
 from fingervision.testbed.reading import Reading
-from fingervision.testbed.run.synchronised_acquisition import Sight
+from fingervision.testbed.run.synchronised_acquisition import Look, Sight
 
 # Status of work in a thread, following bluesky.protocols.Status: done, callbacks, exception.
 
@@ -251,6 +254,7 @@ class GapDevice:
         self._source = self._sight.camera.description.name
         self._newest: dict[str, Any] | None = None
         self._at_s = 0.0
+        self._is_known = False
         self._stop_flight, self._flight = threading.Event(), ThreadStatus(lambda: None)
         self._flown: list[tuple[float, dict[str, Any]]] = []
 
@@ -265,10 +269,14 @@ class GapDevice:
         def work() -> None:
             with self._lock:
                 began_s = self._begin()
+                if not self._is_known:
+                    self._learn([self._sight.look() for _ in range(WANTED)])
+                    began_s = self._clock.now_s()
                 look = self._sight.look()
                 while look.exposed_s < began_s:
                     look = self._sight.look()
-                self._at_s, self._newest = look.exposed_s, self._measured(look, at_once=True)
+                input_mm = self._sight.position.at(look.exposed_s, at_once=True)
+                self._at_s, self._newest = look.exposed_s, self._measured(look, input_mm)
 
         return ThreadStatus(work)
 
@@ -342,9 +350,17 @@ class GapDevice:
         self._clock.wait_until(self._clock.now_s() + POLL_S)
         return self._clock.now_s()
 
+    def _learn(self, looks: Sequence[Look]) -> None:
+        """Learn the camera from the first frames, as for the table of a run: all events are measured by it."""
+        frames = [item for look in looks if isinstance(item := look.shot.item(), Frame)]
+        self._sight.know(camera_beside(frames, self._sight.settings, self._sight.task.scale))
+        self._is_known = True
+
     def _fly(self) -> None:
-        looks: deque[Any] = deque()
+        looks: deque[Look] = deque()
+        placed: list[tuple[Look, float | None]] = []
         left = FRAMES_TO_JOIN
+        learning: ThreadStatus | None = None
         with self._lock:
             began_s = self._begin()
         while left:
@@ -355,11 +371,18 @@ class GapDevice:
                     looks.append(look)
                 while looks and (self._sight.position.at(looks[0].exposed_s) is not None or not left):
                     look = looks.popleft()
-                    self._flown.append((look.exposed_s, self._measured(look, at_once=not left)))
+                    placed.append((look, self._sight.position.at(look.exposed_s, at_once=not left)))
+            # Frames wait until the camera is learnt from the first of them.
+            if not self._is_known and learning is None and (len(placed) >= WANTED or not left):
+                learning = ThreadStatus(partial(self._learn, [look for look, _ in placed[:WANTED]]))
+            if learning is not None and (learning.done or not left) and (error := learning.exception(None)) is not None:
+                raise error
+            if self._is_known:
+                self._flown += [(look.exposed_s, self._measured(look, input_mm)) for look, input_mm in placed]
+                placed.clear()
 
-    def _measured(self, look: Any, *, at_once: bool) -> dict[str, Any]:
+    def _measured(self, look: Look, input_mm: float | None) -> dict[str, Any]:
         row, _ = self._sight.measure(look.shot.item())
-        input_mm = self._sight.position.at(look.exposed_s, at_once=at_once)
         values = {
             "gap_mm": row.gap_mm,
             "u_gap_mm": row.u_gap_mm,

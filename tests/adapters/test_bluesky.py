@@ -18,13 +18,17 @@ from bluesky.protocols import Flyable, Movable, Readable, Stoppable, Triggerable
 import fingervision as fv
 from fingervision.adapters.bluesky import Devices, ThreadStatus, devices
 from fingervision.adapters.bluesky_agent import NextRunAgent, run_steps
+from fingervision.domain.camera import Origin
 from fingervision.domain.errors import DataError, FingervisionError, LimitError, StateError
+from fingervision.measuring.camera_learning import WANTED
 from fingervision.tables.read import read_model
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.simulation.injected_effects import Hidden
 from tests.docs.examples import blocks_of
 
 PLAY_MM, GAIN = 0.12, 7.7
+# The computer may be loaded by other tests.
+PATIENCE_S = 120.0
 pytestmark = pytest.mark.filterwarnings("default")  # warnings of bluesky and its libraries
 
 
@@ -107,6 +111,20 @@ def test_a_flight_gives_an_event_a_frame_and_the_agent_names_what_is_hidden(
     assert ["backlash"] in [list(names) for names in report.alternatives], report.sentence
     suggested = agent.suggest()
     assert bool(suggested) == (report.next_run is not None)
+
+
+def test_events_are_measured_by_the_camera_that_the_first_frames_show(made: Devices) -> None:
+    assert made.gap is not None
+    made.gap.kickoff()
+    made.stage.prepare((0.2, 0.5))
+    made.stage.kickoff()
+    assert made.stage.complete().exception(PATIENCE_S) is None
+    assert made.gap.complete().exception(PATIENCE_S) is None
+    flown = list(made.gap.collect())
+    assert made.gap.trigger().exception(PATIENCE_S) is None
+    assert made.gap._sight.settings.camera.response.origin is Origin.LEARNT
+    assert len(flown) >= WANTED
+    assert {event["data"]["gap_status"] for event in flown} == {"ok"}
 
 
 def test_a_flight_of_the_stage_gives_its_readings(made: Devices, engine: RunEngine) -> None:
