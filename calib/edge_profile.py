@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 # Width of a bin across the edge (pixels), smallest number of pixels in a bin, and smallest number of bins of a profile.
-BIN_PX, FEWEST_IN_BIN, FEWEST_BINS = 0.2, 8, 24
+BIN_PX, FEWEST_IN_BIN, FEWEST_BINS = 0.2, 3, 24
 # Fewest parts along an edge that tell what lies on it, number of bins over which their variance is averaged, and
 # standard deviations by which it must exceed their noise.
 FEWEST_PARTS, SMOOTHED, SURE = 3, 7, 5.0
@@ -102,7 +102,10 @@ def binned_profile(
     off = away_px - middle[place]
     slope = np.bincount(place, off * level) / np.maximum(np.bincount(place, off * off), 1e-9)
     left = level - mean[place] - slope[place] * off
-    variance = np.maximum(np.bincount(place, left**2) / np.maximum(count - 2, 1), rounding**2 / 12.0)
+    squares, free = (
+        np.asarray(each, dtype=np.float64) for each in (np.bincount(place, left**2), np.maximum(count - 2, 0))
+    )
+    variance = np.maximum(_smooth(squares) / np.maximum(_smooth(free), 0.2), rounding**2 / 12.0)
     of_group = np.zeros((int(group.max()) + 1, count.size))
     np.add.at(of_group, (group, place), left)
     shared = np.sum(of_group**2, axis=0) / n**2

@@ -92,15 +92,18 @@ def _band(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
     return np.stack([-breadth, np.zeros_like(breadth)], -1), np.stack([light, 1.0 - light], -1)
 
 
-def _shadow(places: Floats) -> Steps:
-    """Shadow on the ground: its light comes back at these places, from some way on; sides may have unlike shares."""
+def _shadow(places: Floats, *, is_apart: bool = False) -> Steps:
+    """Shadow on the ground: its light comes back at these places; sides may have unlike shares.
+
+    It begins at the edge or, of a part high above the ground, some way apart from it.
+    """
 
     def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
         length = np.broadcast_to(np.exp(p[:, 1:2]), (len(p), side.size))
         # Light from the front casts the same shadow on all sides, light from one side none on its own.
         share = _logistic(ALL_SIDES + side * p[:, 2:3]) / _logistic(np.array(ALL_SIDES))
         depth = _logistic(p[:, :1]) * share
-        rest_at = np.exp(p[:, 3:4, None]) + length[..., None] * places
+        rest_at = length[..., None] * places + (np.exp(p[:, 3:4, None]) if is_apart else 0.0)
         at = np.concatenate([np.zeros((*length.shape, 1)), rest_at], -1)
         rest = np.repeat(depth[..., None] / SHADOW_STEPS, SHADOW_STEPS, -1)
         return at, np.concatenate([1.0 - depth[..., None], rest], -1)
@@ -131,14 +134,13 @@ _BAND = (
     (0.7, 1.2, 0.3),
     tuple(((*_log(width), 0.0, 0.0), 0.5 * width, 0.5 * width) for width in (1.5, 4.0)),
 )
-_SHADOW = (
-    (-1.0, *_log(6.0), 0.0, *_log(0.5)),
-    (1.0, 0.7, 3.0, 1.2),
-    tuple(
-        ((-1.5, *_log(length), side, *_log(from_px)), -0.3, -0.3)
-        for side in (0.0, 5.0, -5.0)
-        for length, from_px in ((4.0, 0.3), (10.0, 0.3), (4.0, 3.0))
-    ),
+_DEPTH_LENGTH_SIDE = (-1.0, *_log(6.0), 0.0), (1.0, 0.7, 3.0)
+_SHADOW_STARTS = tuple((-1.5, *_log(length), side) for side in (0.0, 5.0, -5.0) for length in (4.0, 10.0))
+_SHADOW = (*_DEPTH_LENGTH_SIDE, tuple((start, -0.3, -0.3) for start in _SHADOW_STARTS))
+_SHADOW_APART = (
+    (*_DEPTH_LENGTH_SIDE[0], *_log(2.0)),
+    (*_DEPTH_LENGTH_SIDE[1], 0.7),
+    tuple(((*start, *_log(2.0)), -0.3, -0.3) for start in _SHADOW_STARTS[::2]),
 )
 
 NOTHING = Scene("", _nothing, (), (), (((), 0.0, 0.0),), 0.72)
@@ -150,8 +152,9 @@ SCENES = (
     Scene("wall", _wall(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02, 0.1),
     Scene("glare", _line, *_LINE, 0.06, 0.35),
     Scene("glare", _band, *_BAND, 0.02, 0.35),
-    Scene("shadow", _shadow(_QUANTILES), *_SHADOW, 0.05, 0.1),
-    Scene("shadow", _shadow(-np.log1p(-_QUANTILES)), *_SHADOW, 0.05, 0.1),
+    Scene("shadow", _shadow(_QUANTILES), *_SHADOW, 0.045, 0.1),
+    Scene("shadow", _shadow(-np.log1p(-_QUANTILES)), *_SHADOW, 0.045, 0.1),
+    Scene("shadow", _shadow(_QUANTILES, is_apart=True), *_SHADOW_APART, 0.01, 0.1),
 )
 
 # Distances of the steps that the score test tries, at the inner edges and at all of them.

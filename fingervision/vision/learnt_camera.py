@@ -6,18 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from calib.camera_response import CURVES, standard_response
+from calib.edge_fit import EdgeFit
 from calib.edge_profile import EdgeProfile
-from calib.edge_response import (
-    LINEAR_PRIOR,
-    FamilyFit,
-    ResponsePosterior,
-    family,
-    fit_families,
-    fit_scenes,
-    is_more_beside,
-    probabilities,
-)
+from calib.edge_response import LINEAR_PRIOR, ResponsePosterior, fit_families, probabilities
 from calib.edge_scene import NOTHING
+from calib.scene_fit import fit_scenes, is_more_beside
+from calib.tone_curves import family
 from fingervision.domain.camera import (
     CameraModel,
     CameraQuantity,
@@ -127,14 +121,15 @@ def learnt_from_profiles(
     )
     if not prior.response.is_known:
         camera = _with_response(camera, fits, scenes, coding)
-    if camera.response.curve is assumed and best.scene is not NOTHING:
-        same = [fit for fit in fits if fit.family.name == assumed.name]
-        camera = replace(camera, beside=beside_edges(same, wide) if same else None)
+    if camera.response.curve is assumed and wide:
+        same = [fit for fit in (scenes or fits) if fit.family.name == assumed.name]
+        if any(fit.scene is not NOTHING for fit in same):
+            camera = replace(camera, beside=beside_edges(same, wide))
     return camera
 
 
 def _with_response(
-    camera: CameraModel, fits: Sequence[FamilyFit], scenes: Sequence[FamilyFit], coding: Coding
+    camera: CameraModel, fits: Sequence[EdgeFit], scenes: Sequence[EdgeFit], coding: Coding
 ) -> CameraModel:
     """Camera with the response of the fits; less probable ones with something beside the edges widen what is open."""
     assumed = camera.response.curve
@@ -152,7 +147,7 @@ def _with_response(
     return replace(camera, response=response)
 
 
-def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[list[FamilyFit], float]:
+def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[list[EdgeFit], float]:
     """Fits of all flanks; of the outer ones alone if the inner ones, which side walls spoil, do not agree with them.
 
     What a codec has lost is inferred only where the optics nearly explain the edges: a coarser quantiser than that of
@@ -171,9 +166,7 @@ def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[l
     return fits, misfit
 
 
-def _with_scenes(
-    fits: Sequence[FamilyFit], wide: Sequence[EdgeProfile], coding: Coding
-) -> tuple[list[FamilyFit], float]:
+def _with_scenes(fits: Sequence[EdgeFit], wide: Sequence[EdgeProfile], coding: Coding) -> tuple[list[EdgeFit], float]:
     """Fits with what may stand beside the edges, and the probability of nothing; none if that is surely so."""
     # A tone curve with free parameters imitates what stands beside the edges.
     if not can_tell_beside(wide):
@@ -187,11 +180,11 @@ def _with_scenes(
     return ([], 1.0) if bare > SURE or _misfit(found) > MOST_MISFIT else (found, bare)
 
 
-def _misfit(fits: Sequence[FamilyFit]) -> float:
+def _misfit(fits: Sequence[EdgeFit]) -> float:
     return float(np.sqrt(np.mean(fits[0].misfit)))
 
 
-def _response(fits: Sequence[FamilyFit], coding: Coding) -> ResponseEstimate:
+def _response(fits: Sequence[EdgeFit], coding: Coding) -> ResponseEstimate:
     """Response of the fits, with what they leave open and what they do not know."""
     found = ResponsePosterior.of(fits)
     others = [OtherResponse(other, weight) for other, weight in found.others]
@@ -200,7 +193,7 @@ def _response(fits: Sequence[FamilyFit], coding: Coding) -> ResponseEstimate:
     return ResponseEstimate(found.curve, tuple(others), Origin.LEARNT)
 
 
-def _point_spread(fit: FamilyFit) -> PointSpread:
+def _point_spread(fit: EdgeFit) -> PointSpread:
     sigma, disc, length = (float(np.exp(fit.shared[j])) for j in (0, 1, 4))
     known = CameraQuantity(sigma, sigma * float(fit.u_shared[0]), Origin.LEARNT)
     return PointSpread(known, sigma * disc, (float(fit.shared[2]), float(fit.shared[3])), sigma * length)

@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
+from calib.edge_fit import EdgeFit
 from calib.edge_profile import EdgeProfile
-from calib.edge_response import FamilyFit, fit_scenes, fixed_family, is_more_beside
 from calib.edge_scene import NOTHING
+from calib.scene_fit import fit_scenes, is_more_beside
+from calib.tone_curves import fixed_family
 from fingervision.domain.camera import BesideEdges
 from fingervision.domain.frame import Coding
 from fingervision.vision.flank_profiles import Seen, unclipped_profiles
@@ -54,10 +56,21 @@ def learnt_beside(
 
 
 def with_structure(profiles: Sequence[EdgeProfile], coding: Coding) -> list[EdgeProfile]:
-    """Profiles with what lies on the edges; without it after a lossy codec, whose blocks are as long as their parts."""
-    if coding is Coding.LOSSLESS:
-        return list(profiles)
-    return [replace(profile, u_structure=np.zeros(0)) for profile in profiles]
+    """Profiles with what lies on the edges; without it after a lossy codec, whose blocks are as long as their parts.
+
+    What an edge has of it may be hidden by its noise: it has as much as all have in the mean, or its own.
+    """
+    known = [profile for profile in profiles if profile.u_structure.any()]
+    if coding is not Coding.LOSSLESS or not known:
+        return [replace(profile, u_structure=np.zeros(0)) for profile in profiles]
+
+    def with_mean(profile: EdgeProfile) -> EdgeProfile:
+        each = [np.interp(profile.away_px, one.away_px, one.u_structure**2 / one.contrast**2) for one in known]
+        mean = profile.contrast * np.sqrt(np.sum(each, axis=0) / len(profiles))
+        own = profile.u_structure if profile.u_structure.size else 0.0
+        return replace(profile, u_structure=np.maximum(own, mean))
+
+    return [with_mean(profile) for profile in profiles]
 
 
 def can_tell_beside(profiles: Sequence[EdgeProfile]) -> bool:
@@ -66,7 +79,7 @@ def can_tell_beside(profiles: Sequence[EdgeProfile]) -> bool:
     return inner == 2 and len(profiles) > inner
 
 
-def beside_edges(fits: Sequence[FamilyFit], profiles: Sequence[EdgeProfile]) -> BesideEdges | None:
+def beside_edges(fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile]) -> BesideEdges | None:
     """Mean over fits of one tone curve by their evidence; None if nothing is there, or nothing known explains it."""
     misfit = max(float(np.mean(fits[0].misfit)), 1.0)
     if misfit > MOST_MISFIT:

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from calib.edge_profile import EdgeProfile
-from calib.edge_response import family, fit_scenes, is_more_beside, probabilities
+from calib.edge_response import probabilities
 from calib.edge_scene import NOTHING, SCENES, Scene
+from calib.scene_fit import fit_scenes, is_more_beside
+from calib.tone_curves import family
 
 Floats = NDArray[np.float64]
 

@@ -1,0 +1,88 @@
+"""Evidence for what stands beside the edges: each scene fitted with each family of tone curves."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from calib.edge_fit import START_WIDENED, EdgeData, EdgeFit, derivatives, edge_width, fitted, priors
+from calib.edge_profile import EdgeProfile
+from calib.edge_scene import NOTHING, PROBE, SCENES
+from calib.tone_curves import Family
+
+Floats = NDArray[np.float64]
+
+# Steps after which the best of several starts is chosen; one bin of so many is used for them.
+FIRST_STEPS, COARSE = 7, 3
+# Difference in log evidence beyond which a scene is not tried with further tone curves, which gain less than this.
+HOPELESS = 20.0
+# Difference of the blurs of inner and outer edges (ln sigma) above which a wall narrower than the blur is possible: it
+# is four times the precision of recordings without a wall.
+WIDER_INSIDE = 0.02
+# Rate of false alarms of the score test, and least information of a direction as a share of the largest.
+FALSE_ALARMS, LEAST_TOLD = 1e-3, 1e-3
+
+
+def fit_scenes(
+    profiles: Sequence[EdgeProfile],
+    discrepancy: float,
+    families: Sequence[Family],
+    others: Sequence[Family] = (),
+) -> list[EdgeFit]:
+    """Fit everything that may stand beside the edges, the most probable first.
+
+    Parameters
+    ----------
+    profiles : sequence of EdgeProfile
+        Profiles of dark fingers, at least one of an inner and one of an outer flank.
+    discrepancy : float
+        Standard deviation of a real edge about the best model, smooth over a pixel, as a share of the contrast.
+    families : sequence of Family
+        Families of tone curves that are fitted with every scene.
+    others : sequence of Family
+        Families that are fitted with nothing beside the edges, and with scenes that the first family does not exclude.
+    """
+    data = EdgeData.of(profiles, discrepancy=discrepancy, is_wide=True)
+    coarse = EdgeData.of(profiles, discrepancy=discrepancy, is_wide=True, every=COARSE)
+    narrowest = min(edge_width(profile) for profile in profiles)
+    fits = [fitted(family, data, data.start()) for family in families]
+    for scene in SCENES:
+        begun = []
+        for own, inner_px, outer_px in scene.starts:
+            start = data.start()
+            start[0] = np.log(narrowest / START_WIDENED)
+            start[data.own_places()[:, 0]] = np.where(data.is_outer, outer_px, inner_px)
+            begin = np.array(families[0].mean), np.array(own)
+            begun.append(fitted(families[0], coarse, start, scene, begin, FIRST_STEPS))
+        best = max(begun, key=lambda fit: fit.log_evidence)
+        for family in families:
+            parameters = best.parameters if family is families[0] else np.array(family.mean)
+            best = fitted(family, data, best.edges, scene, (parameters, best.beside))
+            fits.append(best)
+    least = max(fit.log_evidence for fit in fits) - HOPELESS
+    begun = [fit for fit in fits if fit.family is families[0] and (fit.scene is NOTHING or fit.log_evidence > least)]
+    for fit in begun:
+        fits += [fitted(each, data, fit.edges, fit.scene, (np.array(each.mean), fit.beside)) for each in others]
+    return sorted(fits, key=lambda fit: -fit.log_evidence)
+
+
+def is_more_beside(profiles: Sequence[EdgeProfile], model_error: float, family: Family) -> bool:
+    """Whether steps of light beside the edges would explain what the fit of a family leaves (score test)."""
+    data = EdgeData.of(profiles, model_error, is_wide=True)
+    fit = fitted(family, data, data.start())
+    wider = fit.edges[data.own_places()[:, -1]]
+    if abs(float(wider[~data.is_outer].mean() - wider[data.is_outer].mean())) > WIDER_INSIDE:
+        return True
+    k, probes = len(fit.parameters), len(PROBE.mean)
+    unknowns = np.concatenate([fit.parameters, np.zeros(probes), fit.edges])
+    residual, jacobian = derivatives(family, PROBE, data, unknowns)
+    tried, own = jacobian[:, k : k + probes], np.delete(jacobian, np.s_[k : k + probes], axis=1)
+    hessian = own.T @ own + priors(family, NOTHING, data)
+    tried = tried / np.linalg.norm(tried, axis=0)
+    mixed = own.T @ tried
+    information = tried.T @ tried - mixed.T @ np.linalg.solve(hessian, mixed)
+    variance, axes = np.linalg.eigh(information)
+    is_told = variance > LEAST_TOLD * variance[-1]
+    score = (axes.T @ (tried.T @ residual))[is_told] / np.sqrt(variance[is_told])
+    return bool(score @ score > chi2.isf(FALSE_ALARMS, np.count_nonzero(is_told)))
