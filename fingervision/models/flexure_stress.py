@@ -1,14 +1,16 @@
 """Nominal stress in a lumped flexure, from bending and tension, with stress concentration of a notch or of fillets."""
 
+from math import atan, sqrt
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
-from fingervision.models.bars import notch_factors
 from fingervision.models.elastic_mechanism import LargestStress
 from fingervision.models.flexure_span import FlexureSpan
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Mechanism
+from fingervision.models.notch import Notch
 
 Array = NDArray[np.float64]
 
@@ -59,12 +61,26 @@ def fillet_factors(thickness_mm: float, fillet_mm: float, depth_mm: float) -> tu
     return tension, bending
 
 
+# At the surface of a notch the stress is a few per cent higher than in a straight bar, by Neuber's factors for a deep
+# notch (Kerbspannungslehre, 1937; Pilkey, Peterson's Stress Concentration Factors, charts 2.10 and 2.31). A wide plate
+# restrains the hinge, and the resulting stress across the plate lowers the von Mises stress.
+
+
+def notch_factors(notch: Notch) -> tuple[float, float]:
+    """Neuber's stress concentration factors, in tension and bending, of a bar with deep notches on both sides."""
+    ratio = 0.5 * notch.curvature_ratio  # half the neck's height over the radius of curvature
+    root, angle = sqrt(ratio), atan(sqrt(ratio))
+    tension = 2.0 * (ratio + 1.0) * root / ((ratio + 1.0) * angle + root)
+    return tension, 4.0 * ratio * root / (3.0 * (root + (ratio - 1.0) * angle))
+
+
 _SAMPLES = 401
 
 
 def nominal_stress(
-    span: FlexureSpan, end_loads: Array, mechanism: Mechanism, theory: HingeTheory, *, width_effect: bool = True
-) -> LargestStress:
+    span: FlexureSpan, end_loads: Array, mechanism: Mechanism, theory: HingeTheory, *, width_effect: bool = True,
+    stations_mm: Array | None = None,
+) -> LargestStress:  # fmt: skip
     """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) over the free length of a flexure.
 
     It is on the side of the section where tension and bending stresses add.
@@ -82,9 +98,11 @@ def nominal_stress(
         of the fillets, and the constraint by the plate's width.
     width_effect : bool
         Whether the constraint of the flexure by the plate's width is included.
+    stations_mm : ndarray of float, shape (segments + 1,), or None
+        Ends of the segments along the axis; None for those of the span.
     """
     plate_mm = mechanism.plate_mm
-    stations = span.stations_mm(plate_mm)
+    stations = span.stations_mm(plate_mm) if stations_mm is None else stations_mm
     at_ends = np.concatenate([-end_loads[:, 1], end_loads[-1:, 2]])
     # The moment of a beam is linear between the ends of its segments, and is extrapolated linearly to its roots.
     x = np.linspace(*span.free_mm, _SAMPLES)

@@ -10,8 +10,6 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Material
 from fingervision.models.notch import Notch
 
-_SMITH_RANGE = (0.2, 0.8)
-
 
 def paros_weisbord_bending(notch: Notch, material: Material) -> float:
     """Rotation per moment about z in rad/(N mm), in full: Paros and Weisbord, Machine Design 37 (1965) 151.
@@ -30,19 +28,6 @@ def paros_weisbord_bending(notch: Notch, material: Material) -> float:
     return 3.0 / (2.0 * material.youngs_modulus_mpa * b * R**2 * B) * bracket
 
 
-def paros_weisbord_simplified_bending(notch: Notch, material: Material) -> float:
-    """Rotation per moment about z in rad/(N mm), for thin hinges: 9 pi sqrt(R) / (2 E b t^(5/2)).
-
-    Error -1.2 % at t / R = 0.05, -5.6 % at 0.25, -11 % at 0.8; by chance, this is better than the full formula.
-    """
-    return (
-        9.0
-        * pi
-        * sqrt(_radius_mm(notch))
-        / (2.0 * material.youngs_modulus_mpa * notch.plate_mm * notch.thickness_mm**2 * sqrt(notch.thickness_mm))
-    )
-
-
 def wu_zhou_bending(notch: Notch, material: Material) -> float:
     """Rotation per moment about z in rad/(N mm): Wu and Zhou (2002).
 
@@ -59,35 +44,6 @@ def wu_zhou_axial(notch: Notch, material: Material) -> float:
     s = _radius_mm(notch) / notch.thickness_mm
     integral = 2.0 * (2.0 * s + 1.0) / sqrt(4.0 * s + 1.0) * atan(sqrt(4.0 * s + 1.0)) - pi / 2.0
     return integral / (material.youngs_modulus_mpa * notch.plate_mm)
-
-
-def schotborgh_bending(notch: Notch, material: Material) -> float:
-    """Rotation per moment about z in rad/(N mm), fitted to FEM: Schotborgh et al., Precision Eng. 29 (2005) 41.
-
-    For 0.05 <= t / R <= 0.65, error within 3.3 %: -2.6 % at 0.05, -1.1 % at 0.25, +3.3 % at 0.65.
-    """
-    root = sqrt(notch.thickness_mm / (2.0 * _radius_mm(notch)))
-    E, b, t = material.youngs_modulus_mpa, notch.plate_mm, notch.thickness_mm
-    return 12.0 / (E * b * t**2 * (-0.0089 + 1.3556 * root - 0.5227 * root**2))
-
-
-def smith_bending(notch: Notch, material: Material) -> float:
-    """Rotation per moment about z in rad/(N mm), fitted to FEM: Smith, Flexures (2000).
-
-    Only for 0.2 <= t / R <= 0.8, where the error is -3.1 to +4.2 %; at 0.05 it would be +46 %.
-
-    Raises
-    ------
-    FingervisionError
-        If t / R is outside this range.
-    """
-    ratio = notch.thickness_mm / _radius_mm(notch)
-    if not _SMITH_RANGE[0] <= ratio <= _SMITH_RANGE[1]:
-        raise FingervisionError(
-            f"Smith's formula needs 0.2 <= t / R <= 0.8, but t / R is {ratio:.3g}; take the corrected compliance."
-        )
-    R, t = _radius_mm(notch), notch.thickness_mm
-    return 24.0 * (0.565 * ratio + 0.166) * R / (material.youngs_modulus_mpa * notch.plate_mm * t**3)
 
 
 def _radius_mm(notch: Notch) -> float:

@@ -3,10 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Material
 from fingervision.models.hinge_correction import corrected_compliance
-from fingervision.models.notch import Notch, bar_compliance, beam_compliance, circular_notch, masses_t
+from fingervision.models.notch import Notch, beam_compliance, circular_notch, masses_t
 from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 from tests.models import hinge_closed_forms as closed
 
@@ -28,15 +27,6 @@ RIGID_ENDS = {
     0.65: (-6.6, -9.2, -12.6),
     0.8: (-5.8, -8.3, -13.2),
 }
-# Errors in % between elastic blocks of length 2 (2 R + t): Paros-Weisbord full, simplified, Schotborgh, along.
-BLOCKS = {
-    0.05: (-1.9, -1.2, -2.6, -10.4),
-    0.1: (-3.8, -2.5, -2.4, -13.6),
-    0.25: (-8.7, -5.6, -1.1, -18.3),
-    0.5: (-14.9, -9.1, 1.4, -21.8),
-    0.8: (-20.1, -11.2, 5.4, -23.6),
-}
-SMITH = {0.2: 0.9, 0.25: -1.6, 1 / 3: -3.1, 0.5: -2.1, 0.65: 0.7, 0.8: 4.2}
 # t = 1, R = 4, b = 3 between rigid end planes, bricks: entries (row, column) and values in mm, N, rad.
 BRICKS = {
     (0, 0): 9.247e-4,
@@ -83,62 +73,12 @@ def test_errors_of_beam_theory_between_rigid_ends(ratio: float) -> None:
     assert errors == pytest.approx(RIGID_ENDS[ratio], abs=POINTS)
 
 
-def between_blocks(ratio: float) -> np.ndarray:
-    notch = circular_notch(1.0, ratio, 1.0)
-    height = 2.0 + ratio
-    blocks = bar_compliance(2.0 * height, height, 1.0, PA2200)[PLANAR]
-    whole = plane_compliance(notch, PA2200, block_mm=2.0 * height)
-    return np.array([whole[0, 0] - 2.0 * blocks[0, 0], whole[2, 2] - 2.0 * blocks[2, 2]])
-
-
-@pytest.mark.parametrize("ratio", BLOCKS)
-def test_errors_of_the_closed_forms_between_blocks(ratio: float) -> None:
-    notch = circular_notch(1.0, ratio, 1.0)
-    along, bending = between_blocks(ratio)
-    forms = (closed.paros_weisbord_bending, closed.paros_weisbord_simplified_bending, closed.schotborgh_bending)
-    errors = [100.0 * (form(notch, PA2200) / bending - 1.0) for form in forms]
-    errors.append(100.0 * (closed.wu_zhou_axial(notch, PA2200) / along - 1.0))
-    assert errors == pytest.approx(BLOCKS[ratio], abs=POINTS)
-
-
-@pytest.mark.parametrize("ratio", SMITH)
-def test_errors_of_smith_in_its_range(ratio: float) -> None:
-    _, bending = between_blocks(ratio)
-    error = 100.0 * (closed.smith_bending(circular_notch(1.0, ratio, 1.0), PA2200) / bending - 1.0)
-    assert error == pytest.approx(SMITH[ratio], abs=POINTS)
-
-
-def test_smith_is_refused_outside_its_range() -> None:
-    with pytest.raises(FingervisionError, match=r"needs 0\.2 <= t / R <= 0\.8, but t / R is 0\.1; take the corrected"):
-        closed.smith_bending(circular_notch(10.0, 1.0, 1.0), PA2200)
-
-
-def test_closed_forms_refuse_an_ellipse() -> None:
-    with pytest.raises(FingervisionError, match="is that of a circular notch, but the half axes are 4 and 2 mm"):
-        closed.wu_zhou_bending(Notch(1.0, 4.0, 2.0, 3.0), PA2200)
-
-
 def test_corrected_hinge_is_that_of_the_bricks() -> None:
     notch = circular_notch(4.0, 1.0, 3.0)
     bricks, corrected = solid_compliance(notch, PA2200), corrected_compliance(notch, PA2200)
     for place, value in BRICKS.items():
         assert bricks[place] == pytest.approx(value, rel=ENTRY)
         assert corrected[place] == pytest.approx(value, rel=ENTRY)
-
-
-def segment_sum(segments: int) -> float:
-    notch = circular_notch(4.0, 1.0, 3.0)
-    middles = 4.0 * ((2.0 * np.arange(segments) + 1.0) / segments - 1.0)
-    parts = [bar_compliance(8.0 / segments, h, 3.0, PA2200)[5, 5] for h in notch.height_mm(middles).tolist()]
-    return float(100.0 * (sum(parts) / beam_compliance(notch, PA2200)[5, 5] - 1.0))
-
-
-def test_segments_of_middle_height_converge_to_the_integral() -> None:
-    errors = {segments: segment_sum(segments) for segments in (4, 5, 6, 8, 10)}
-    # The values are printed with two digits: half a unit of the last digit.
-    expected = {4: -7.6, 5: 2.3, 6: -0.6, 8: -0.01, 10: 0.02}
-    assert [errors[n] for n in (4, 5, 6)] == pytest.approx([expected[n] for n in (4, 5, 6)], abs=0.05)
-    assert [errors[n] for n in (8, 10)] == pytest.approx([expected[n] for n in (8, 10)], abs=0.006)
 
 
 @settings(max_examples=20)

@@ -1,17 +1,16 @@
 """Nominal stress in the hinges: against the stress of a bar, finite elements, and scaling laws of elasticity."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from fingervision.domain.gripper import Gripper
-from fingervision.models.bars import peak_hinge_stress
 from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.gripper_mechanism import redrawn
+from fingervision.models.flexure_span import FlexureSpan
+from fingervision.models.flexure_stress import nominal_stress
+from fingervision.models.gripper_mechanism import half_mechanism, redrawn
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.skeleton import skeleton_of
+from fingervision.models.notch import notches_of
 
 NOTCH = 0.02
 """Tolerance of Neuber's factor for a deep notch at t / R = 0.25, and of the frame's force, against finite elements."""
@@ -43,22 +42,9 @@ def test_stress_goes_with_the_modulus_and_not_with_the_plate_of_a_beam(gripper: 
     assert thick.peak_stress().mpa_per_mm == pytest.approx(bare)
 
 
-def test_a_rotation_of_one_hinge_is_its_bending_moment(gripper: Gripper) -> None:
-    """If everything beyond hinge 1 rotates by a small angle, the moment is angle / C along the whole hinge."""
-    skeleton = skeleton_of(gripper, HingeTheory.BEAM, 40)
-    angle = 1e-3
-    members = [place for place, member in enumerate(skeleton.members) if member.name == "hinge 1"]
-    yielding = np.array([skeleton.members[place].compliance[5, 5] for place in members])
-    displacement = np.zeros((members[-1] + 2, 3))
-    moment = angle / yielding.sum()
-    for place in members:
-        member = skeleton.members[place]
-        length = np.hypot(*np.subtract(member.end_mm, member.start_mm))
-        before = displacement[member.parent + 1]
-        # Under a pure moment M, every segment rotates by C M, and its end moves sideways by the coupling term.
-        aside, turn = member.compliance[[1, 5], 5] * moment
-        displacement[place + 1] = before + np.array([-before[2] * length - aside, 0.0, turn])
-    still = replace(skeleton, members=skeleton.members[: members[-1] + 1])
-    peak = peak_hinge_stress(gripper, still, displacement.ravel())
-    thickness, plate = gripper.hinge.thickness_mm, gripper.body.plate_mm
-    assert peak.mpa == pytest.approx(6.0 * moment / (plate * thickness**2), rel=1e-6)
+def test_a_pure_moment_is_carried_by_the_neck(gripper: Gripper) -> None:
+    half, notch, moment = half_mechanism(gripper), notches_of(gripper)[0], 20.0
+    span = FlexureSpan(half.flexures[0], (-notch.reach_mm, notch.reach_mm), (-4.0, 4.0), (9.0, 9.0))
+    rows = np.tile([0.0, -moment, moment], (40, 1))
+    peak = nominal_stress(span, rows, half, HingeTheory.BEAM, stations_mm=notch.stations_mm(40))
+    assert peak.mpa == pytest.approx(6.0 * moment / (notch.plate_mm * notch.thickness_mm**2), rel=1e-6)

@@ -1,9 +1,6 @@
 """Mechanisms from drawings, against closed formulas that share no code with the models."""
 
-import itertools
-import shutil
-import subprocess
-from math import asin, cos, pi, radians, sin, sqrt
+from math import cos, pi, radians, sin, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -197,82 +194,6 @@ def test_an_elliptic_flexure_by_quadrature(tmp_path: Path) -> None:
     # Plane stress is softer than beam theory by 2.8 % at a thickness of 0.075 of the radius at the neck: the table of
     # test_hinge.py has 1.9 and 3.7 % at 0.05 and 0.1.
     assert 1.0 / model.stiffness_n_mm == pytest.approx(1.028 * soft + bars, rel=ONE_PERCENT)
-
-
-def mapped_neck(thickness: int = 6, beside: int = 5) -> tuple[dict[tuple[float, float], int], list[list[int]]]:
-    """Eight-node quadrilaterals on columns of the lever with a filleted neck; nodes by place, elements by nodes."""
-    t, a, r, reach, foot = (NECK[name] for name in ("t", "a", "fillet", "reach", "foot"))
-    corner = [a - r + r * sin(angle) for angle in np.linspace(0.0, pi / 2, 13)]
-    neck = np.concatenate([-np.array(corner[::-1]), np.linspace(-(a - r), a - r, 25)[1:-1], corner])
-    grown = np.cumsum(0.08 * 1.25 ** np.arange(60))
-    right = np.append(a + grown[grown < 0.95 * (reach - a)], reach)
-    left = -np.append(a + grown[grown < 0.9 * (foot - a)], foot)[::-1]
-    band = 0.5 * t + r
-
-    def half(x: float) -> float:
-        within = max(abs(x) - (a - r), 0.0) / r
-        return 0.5 * t + r * (1.0 - sqrt(max(1.0 - within**2, 0.0)))
-
-    def midway(x0: float, x1: float) -> float:
-        # On a fillet, midside nodes are placed at the mean angle, so that they lie on the arc and divide the edge
-        # evenly.
-        if max(abs(x0), abs(x1)) <= a and min(abs(x0), abs(x1)) >= a - r - 1e-9:
-            first, second = (asin(min(1.0, (abs(x) - (a - r)) / r)) for x in (x0, x1))
-            return float(np.copysign(a - r + r * sin(0.5 * (first + second)), x0 + x1))
-        return 0.5 * (x0 + x1)
-
-    nodes: dict[tuple[float, float], int] = {}
-    elements = []
-
-    def node(x: float, y: float) -> int:
-        return nodes.setdefault((round(x, 9), round(y, 9)), len(nodes) + 1)
-
-    inner = np.linspace(-1.0, 1.0, thickness + 1)
-    outer = band + (3.0 - band) * np.linspace(0.0, 1.0, beside + 1) ** 1.5
-    for stations, tall in ((left, True), (neck, False), (right, True)):
-        xs = np.concatenate([stations, [-a]]) if stations is left else stations
-        xs = np.concatenate([[a], stations]) if stations is right else xs
-        for x0, x1 in zip(xs[:-1].tolist(), xs[1:].tolist(), strict=True):
-            rows = [(s0, s1, True) for s0, s1 in itertools.pairwise(inner)]
-            if tall:
-                rows += [(y0, y1, False) for y0, y1 in itertools.pairwise(outer)]
-                rows += [(-y1, -y0, False) for y0, y1 in itertools.pairwise(outer)]
-            xm = midway(x0, x1)
-            for low, high, mapped in rows:
-
-                def at(x: float, s: float, mapped: bool = mapped, tall: bool = tall) -> tuple[float, float]:
-                    return x, s * (band if tall else half(x)) if mapped else s
-
-                middle = 0.5 * (low + high)
-                places = [at(x0, low), at(x1, low), at(x1, high), at(x0, high),
-                          at(xm, low), at(x1, middle), at(xm, high), at(x0, middle)]  # fmt: skip
-                elements.append([node(*place) for place in places])
-    return nodes, elements
-
-
-@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (Debian package calculix-ccx) is absent")
-@both_kinds
-def test_a_filleted_flexure_by_calculix(tmp_path: Path, kind: Kind) -> None:
-    """The same lever computed by CalculiX, on an independent mapped mesh.
-
-    CalculiX expands plane-stress elements into bricks, which leaves its forces within 0.4 % of true plane stress where
-    the plate is thin (mechanics of the paper's sample, section 3): 0.5 % for both meshes together.
-    """
-    nodes, elements = mapped_neck()
-    thin = 0.01
-    lines = ["*NODE, NSET=ALL", *(f"{n},{x},{y},0" for (x, y), n in nodes.items()), "*ELEMENT, TYPE=CPS8, ELSET=BODY"]
-    lines += [f"{i}," + ",".join(map(str, element)) for i, element in enumerate(elements, 1)]
-    for name, end in (("FOOT", -NECK["foot"]), ("FACE", NECK["reach"])):
-        lines += [f"*NSET, NSET={name}", *(f"{n}," for (x, _), n in nodes.items() if x == end)]
-    lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", f"{STEEL[0]},{STEEL[1]}"]
-    lines += ["*SOLID SECTION, ELSET=BODY, MATERIAL=STEEL", f"{thin}", "*BOUNDARY", "FOOT,1,2", "*STEP", "*STATIC"]
-    lines += ["*BOUNDARY", "FACE,2,2,1.", "*NODE PRINT, NSET=FACE, TOTALS=ONLY", "RF", "*END STEP"]
-    (tmp_path / "neck.inp").write_text("\n".join(lines) + "\n")
-    subprocess.run(["ccx", "neck"], cwd=tmp_path, check=True, capture_output=True, timeout=120)
-    totals = [line.split() for line in (tmp_path / "neck.dat").read_text().splitlines()]
-    force = next(float(cells[1]) for cells in totals if len(cells) == 3 and not cells[0].isalpha())
-    model = kind(lever_on("filleted", tmp_path), width_effect=False)
-    assert model.stiffness_n_mm == pytest.approx(force * 0.3 / thin, rel=0.005)
 
 
 def test_the_axis_of_a_flexure_turns_with_it() -> None:
