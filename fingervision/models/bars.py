@@ -47,8 +47,6 @@ class BarFrame(ElasticMechanism):
         Theory of the hinges' compliance.
     segments : int
         Segments per notch; 0 for one segment with the compliance of the whole notch.
-    block : ndarray of float, shape (3, 3), or None
-        Result of `skeleton.unit_compliance` for the drive block, if already computed.
     sways : bool
         Whether both halves and the drive move the same way sideways.
     """
@@ -61,12 +59,11 @@ class BarFrame(ElasticMechanism):
         theory: HingeTheory,
         segments: int = SEGMENTS,
         *,
-        block: Array | None = None,
         sways: bool = False,
     ) -> None:
         super().__init__(half_mechanism(gripper))
         self.gripper, self.theory, self._sways = gripper, theory, sways
-        self.skeleton = skeleton_of(gripper, theory, segments, block=block)
+        self.skeleton = skeleton_of(gripper, theory, segments)
         members = self.skeleton.members
         nodes = np.array([members[0].start_mm, *(member.end_mm for member in members)])
         ends = np.array([(member.parent + 1, place + 1) for place, member in enumerate(members)])

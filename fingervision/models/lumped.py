@@ -402,8 +402,6 @@ class LumpedGripper(DrawnGripper):
         Which effects beyond small displacements are included.
     theory : HingeTheory
         Theory of the hinges' compliance.
-    block : ndarray of float, shape (3, 3), or None
-        With `bars_alone`, result of `skeleton.unit_compliance` for the drive block, if already computed.
     bars_alone : bool
         Whether the bodies are modelled by bars joined at points, which takes a hundredth of the time.
     segments : int
@@ -418,13 +416,12 @@ class LumpedGripper(DrawnGripper):
         physics: Physics = LINEAR,
         theory: HingeTheory = HingeTheory.CORRECTED,
         *,
-        block: NDArray[np.float64] | None = None,
         bars_alone: bool = False,
         segments: int = SEGMENTS,
     ) -> None:
         elastic: ElasticMechanism
         if bars_alone:
-            elastic, errors = BarFrame(gripper, theory, segments, block=block), _ERRORS_OF_BARS
+            elastic, errors = BarFrame(gripper, theory, segments), _ERRORS_OF_BARS
         else:
             elastic = MechanismFrame(half_mechanism(gripper), theory=theory)
             force = _ERRORS.force + 2.0 * force_uncertainty(gripper.material)

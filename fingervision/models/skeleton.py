@@ -75,11 +75,6 @@ class BlockShape:
     poisson: float
 
     @property
-    def numbers(self) -> tuple[float, ...]:
-        """All dimensions of the block as one row of numbers."""
-        return (self.half_width, self.low, self.high, *self.start, *self.end, self.face_half, self.poisson)
-
-    @property
     def entry(self) -> PointMm:
         """Point where the shuttle's axis enters the block."""
         (xa, ya), (xb, yb) = self.start, self.end
@@ -104,15 +99,13 @@ def block_shape(gripper: Gripper) -> BlockShape:
                       placed(lever.drive_face_half_width_mm, 0.0)[0], gripper.material.poisson_ratio)  # fmt: skip
 
 
-def drive_block_compliance(gripper: Gripper, unit: Array | None = None) -> Array:
+def drive_block_compliance(gripper: Gripper) -> Array:
     """Compliance that the drive block adds at the point where the shuttle's axis enters it.
 
     Parameters
     ----------
     gripper : Gripper
         The drawing.
-    unit : ndarray of float, shape (3, 3), or None
-        Result of `unit_compliance` for this block, if already computed.
 
     Returns
     -------
@@ -120,7 +113,7 @@ def drive_block_compliance(gripper: Gripper, unit: Array | None = None) -> Array
         Motion (x, y, rotation) of that point per unit load at it, in global axes.
     """
     turned = np.array([1.0, 1.0, 1.0 / gripper.links.shuttle_width_mm])
-    unit = unit_compliance(block_shape(gripper)) if unit is None else unit
+    unit = unit_compliance(block_shape(gripper))
     return np.outer(turned, turned) * unit / (gripper.material.youngs_modulus_mpa * gripper.body.plate_mm)
 
 
@@ -273,7 +266,6 @@ def skeleton_of(
     segments: int,
     *,
     rigid_links: bool = False,
-    block: Array | None = None,
 ) -> Skeleton:
     """Reduce a drawing to its tree of members.
 
@@ -288,8 +280,6 @@ def skeleton_of(
         the whole hinge.
     rigid_links : bool
         Whether only the hinges are elastic, as in the equations of Hricko & Havlik (2015).
-    block : ndarray of float, shape (3, 3), or None
-        Result of `skeleton.unit_compliance`, if already computed.
 
     Raises
     ------
@@ -343,7 +333,7 @@ def skeleton_of(
     drive = tree.rigid(at, entry, lever.drive_mm, "drive block", (box_mm[1] - box_mm[0]) * (box_mm[3] - box_mm[2]),
                        box_mm[3] - box_mm[2])  # fmt: skip
     if not rigid_links and theory is HingeTheory.CORRECTED:
-        tree.members[drive] = _yielding(tree.members[drive], drive_block_compliance(gripper, block))
+        tree.members[drive] = _yielding(tree.members[drive], drive_block_compliance(gripper))
         tree.members[drive] = _bending_out_of_plane(tree.members[drive], gripper)
     at = link(joint, meeting, foot, "cross bar's end", links.cross_bar_width_mm)
     tip = links.tip_polygon_mm
