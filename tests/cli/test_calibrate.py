@@ -196,26 +196,3 @@ def test_a_video_is_a_picture_with_its_own_transfer_tag(tmp_path: Path, first: s
     text = tmp_path / "text.mp4"
     text.write_text("no video")
     assert "text.mp4" in sentence_of(run("bar", f"{text}=5", "-o", out))
-
-
-def test_a_line_scale_from_the_command_line(tmp_path: Path) -> None:
-    x = np.arange(300.0)
-    dark = sum(np.clip(4.5 - np.abs(x - at), 0.0, 1.0) for at in np.arange(20.0, 290.0, 30.25))
-    levels = np.tile(200.0 - 160.0 * dark, (160, 1)) + np.random.default_rng(1).normal(0.0, 1.5, (160, 300))
-    image = save(tmp_path / "micrometer.png", np.rint(levels).astype(np.uint8))
-    out = tmp_path / "c.json"
-    result = run("scale", image, "--pitch-mm", "0.1", "-o", out, "--certificate", "K-3", "--json")
-    assert result.exit_code == 0, result.output
-    content = json.loads(result.output)
-    assert content["px_per_mm"] == pytest.approx(302.5, rel=1e-4)
-    assert content["lines_used"] == 9
-    calibration = read_calibration(out)
-    assert calibration.references[0].certificate == "K-3"
-    assert calibration.references[0].size_mm == pytest.approx(0.8)
-    assert cv2.imread(str(tmp_path / "c_micrometer.png")) is not None
-    assert "Written" in run("scale", image, "--pitch-mm", "0.1", "-o", out, "--no-picture").output
-    for wrong in (("--pitch-mm", "-1"), ("--pitch-mm", "0.1", "--roi", "0,0,5000,10"), ("--pitch-mm", "nan")):
-        assert sentence_of(run("scale", image, *wrong, "-o", out))
-    foreign = tmp_path / "notes.txt"
-    foreign.write_text("mine")
-    assert "notes.txt" in sentence_of(run("scale", image, "--pitch-mm", "0.1", "-o", foreign))

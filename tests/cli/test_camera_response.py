@@ -143,20 +143,3 @@ def test_response_files_that_are_none(
     )
     assert isinstance(result.exception, FingervisionError)
     assert words in str(result.exception)
-
-
-def test_exposures_on_the_command_line(tmp_path: Path) -> None:
-    rng = np.random.default_rng(3)
-    scene = np.kron(rng.uniform(0.01, 1.0, (16, 20)), np.ones((24, 24)))
-    items = []
-    for time in (0.25, 0.5, 1.0, 2.0):
-        path = tmp_path / f"e{time}.png"
-        assert cv2.imwrite(str(path), stored(power_law(noisy(time * scene, 1e-3, rng), GAMMA)))
-        items.append(f"{path}={time}")
-    out = tmp_path / "response.csv"
-    result = run(calibrate, "response", *items, "-o", out, "--json")
-    assert result.exit_code == 0, result.output
-    assert json.loads(result.output)["exponent"] == pytest.approx(GAMMA, rel=0.01)
-    level, light = np.loadtxt(out, delimiter=",", skiprows=1).T
-    assert np.abs(light - (level / 255.0) ** GAMMA).max() < 0.005
-    assert isinstance(run(calibrate, "response", items[0], "-o", out).exception, FingervisionError)

@@ -111,13 +111,6 @@ def test_a_play_that_stays_engaged_belongs_to_the_set_of_an_offset() -> None:
     assert frozenset({"backlash"}) in judgement.must
 
 
-def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
-    for folder in ("a", "b"):
-        draw_table_of_row(ROWS["poor"], SEED, 1, tmp_path / folder)
-    for name in ("measured.csv", "simulation.csv", "truth.json", "right.json"):
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
-
-
 # Two kinds of table are tested only in the benchmark: poor runs, because the set of explanations depends on the noise,
 # and most effects outside the catalogue, because their many imitations take a minute per table.
 QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outside", 1),

@@ -134,13 +134,6 @@ def test_readings_at_rest_know_no_lag() -> None:
     assert not {"rest_gap_error", "thermal_drift", "input_scale"} & right.core[0]
 
 
-def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
-    for folder in ("a", "b"):
-        draw_table("sparse", SEED, 1, tmp_path / folder)
-    for name in ("measured.csv", "simulation.csv", "truth.json"):
-        assert (tmp_path / "a/sparse_1" / name).read_bytes() == (tmp_path / "b/sparse_1" / name).read_bytes()
-
-
 def report(verdict: str, *names: str, alternatives: tuple[tuple[str, ...], ...] = ()) -> dict[str, object]:
     effects = [{"name": n, "parameters": {}} for n in names]
     standing = {"before_rms_mm": 1.0, "after_rms_mm": 0.01, "noise_rms_mm": 0.01}

@@ -12,8 +12,6 @@ import cv2
 import numpy as np
 import pytest
 
-from fingervision.live.page_socket import STATE_EVERY_S
-from fingervision.live.session import SILENT_S
 from tests.live.browser import PATIENCE_MS, browser, drag, needs_chromium, opened, says, shown
 
 __all__ = ["browser", "opened"]
@@ -23,7 +21,6 @@ pytestmark = needs_chromium
 # What the page shows has four decimals, the table seven.
 SHOWN_MM = 0.00005
 BAR_PX, BAR_MM = 136, 4.0
-SAID_WITHIN_S = 1.0
 
 
 def no_value_is_left(page: Any, status: str) -> None:
@@ -231,21 +228,3 @@ def test_the_page_fits_a_phone_and_comes_back_after_a_restart(
     page.locator("#connection", has_text="connected").wait_for()
     before = int(page.get_attribute("#picture", "data-shown"))
     shown(page, f"Number(document.querySelector('#picture').dataset.shown) > {before + 5}")
-
-
-@pytest.mark.slow
-def test_a_cut_is_said_within_a_second_and_measuring_resumes(
-    live: Callable[..., Any], opened: Callable[..., Any], camera: Any
-) -> None:
-    view = live(camera.address, "--px-per-mm", "34", "--port", "0")
-    page = opened(view.address)
-    shown(page, "document.querySelector('#status').textContent === 'ok'")
-    shown(page, "document.querySelector('#alarm').hidden")
-    camera.stop()
-    page.locator("#alarm", has_text="No picture for").wait_for()
-    no_value_is_left(page, "no picture")
-    # How soon is counted by the program, and not by a browser that waits for a busy machine.
-    assert SILENT_S + STATE_EVERY_S < SAID_WITHIN_S
-    camera.start()
-    says(page, "The source is back")
-    shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")

@@ -1,6 +1,6 @@
 """Benchmark of hidden effects: simulate tables, apply every method, and print a table of marks.
 
-    python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1 --methods diagnose,ideal
+    python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1
 
 All results are stored under --out by seed, row and number, so that a run may be stopped and continued. All rows are
 processed in turn. With --minutes M, no table is begun after that time; --minutes 0 prints the stored results; --again
@@ -23,7 +23,6 @@ from tests.benchmarks.hidden.binomial import Rate
 from tests.benchmarks.hidden.catalogue_chain import MAP
 from tests.benchmarks.hidden.diagnose_adapter import Answer, diagnose, read_report
 from tests.benchmarks.hidden.explanations import known_effects, problem_of
-from tests.benchmarks.hidden.ideal import ideal
 from tests.benchmarks.hidden.next_run_gain import Gain, gain_that_came
 from tests.benchmarks.hidden.recipe import NotDrivenError
 from tests.benchmarks.hidden.reported_effects import reported_effects
@@ -33,7 +32,7 @@ from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
 from tests.benchmarks.hidden.unforeseen import widened
 from tests.benchmarks.hidden.unseen_run import unseen_error_ratio
 
-METHODS = ("diagnose", "ideal")
+METHODS = ("diagnose",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +61,10 @@ def _ask(table: JudgedTable, method: str) -> Answer:
     report = table.folder / "diagnosis" / "report.json"
     if kept.exists():
         held = json.loads(kept.read_text(encoding="utf-8"))
-        if method == "diagnose" and report.exists():
+        if report.exists():
             return read_report(report, held["seconds"])
         return Answer(held["verdict"], tuple(frozenset(s) for s in held["sets"]), held["seconds"], held["report"])
-    answer = diagnose(table.folder) if method == "diagnose" else ideal(table)
+    answer = diagnose(table.folder)
     held = {"verdict": answer.verdict, "sets": [sorted(s) for s in answer.sets], "seconds": answer.seconds}
     held["report"] = answer.report if answer.verdict == "failed" else {}
     kept.write_text(json.dumps(held, indent=1), encoding="utf-8")
@@ -91,7 +90,7 @@ def work(task: Task) -> dict[str, object]:
     result: dict[str, object] = {"mark": asdict(given), "verdict": answer.verdict, "seconds": answer.seconds}
     result |= {"sets": ["+".join(sorted(s)) for s in answer.sets], "hidden": "+".join(sorted(hidden))}
     result["folder"] = str(folder)
-    if task.method != "diagnose" or answer.verdict == "failed":
+    if answer.verdict == "failed":
         return result
     known = known_effects(table.experiment, problem_of(table.experiment, table.experiment.traces(), known_input=False))
     if given.right and row.hidden and answer.sets:
@@ -180,7 +179,7 @@ def _tell(task: Task, result: dict[str, object], misses: Path | None) -> None:
             f"   {task.method} missed {task.row} {task.index}: hidden {hidden or '-'}, said {said} {result['sets']}",
             flush=True,
         )
-        if misses is not None and task.method == "diagnose":
+        if misses is not None:
             name = f"{task.row}_seed{task.seed}_{task.index:04d}"
             shutil.copytree(str(result["folder"]), misses / name, dirs_exist_ok=True)
 
