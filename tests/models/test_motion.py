@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError, UsageError
@@ -12,11 +13,10 @@ from fingervision.domain.gripper import Gripper
 from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping, parse_damping
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.modal_model import frequency_response, modal_motion, resolved_frequencies_hz
+from fingervision.models.modal_model import ModalModel, frequency_response, modal_motion, resolved_frequencies_hz
 from fingervision.models.motion_in_time import gripper_motion
 from fingervision.models.physics import Physics
 from fingervision.storage.mechanism_toml import read_mechanism
-from tests.models.test_mechanism_motion import integrated
 
 HALF_PERCENT, ONE_PERCENT = 0.005, 0.01
 STAGE = Path(__file__).parents[2] / "fingervision" / "models" / "mechanisms" / "parallel_leaf_stage.toml"
@@ -26,6 +26,26 @@ def steps(*corners: tuple[float, float], rows: int = 400) -> DriveHistory:
     times, inputs = np.array(corners).T
     at = np.union1d(np.linspace(times[0], times[-1], rows), times)
     return DriveHistory(at, np.interp(at, times, inputs))
+
+
+def integrated(model: ModalModel, ratios: np.ndarray, drive: DriveHistory, kinks: tuple[float, float]) -> np.ndarray:
+    """Modal coordinates by scipy's DOP853, with kinks of the drive as jumps of speed."""
+    kept = ratios.size
+    w, participation = model.rad_s[:kept], model.participation[:kept]
+
+    def slope(_: float, state: np.ndarray) -> np.ndarray:
+        q, v = state.reshape(2, -1)
+        return np.concatenate([v, -2 * ratios * w * v - w**2 * q])
+
+    speed = drive.input_mm[-1] / kinks[0]
+    state, rows = np.zeros(2 * kept), []
+    for (begin, end), jump in (((0.0, kinks[0]), speed), (kinks, -speed)):
+        state[kept:] -= participation * jump
+        inside = drive.time_s[(drive.time_s >= begin) & (drive.time_s <= end)]
+        way = solve_ivp(slope, (begin, end), state, "DOP853", inside, rtol=1e-10, atol=1e-15)
+        rows.append(way.y[:kept].T if not rows else way.y[:kept].T[1:])
+        state = way.y[:, -1]
+    return np.concatenate(rows)
 
 
 @pytest.mark.parametrize("damping", [ModalDamping(0.025), LossFactor(0.1), PaperDamping()], ids=["modal", "loss", "4"])
