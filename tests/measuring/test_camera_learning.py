@@ -11,7 +11,7 @@ from calib.camera_response import standard_response
 from fingervision.domain.camera import Origin, stated_camera
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
-from fingervision.measuring.camera_learning import camera_of, learnt_first
+from fingervision.measuring.camera_learning import camera_beside, camera_of, learnt_first
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX
 from tests.benchmarks.unknown_cameras import CLASSES, PX_PER_MM, Film, Recording, drawn
@@ -62,6 +62,14 @@ def test_a_linear_camera_stays_linear_to_the_digit(recording: Recording) -> None
     before, after = (measure_frame(first, s) for s in (SETTINGS, replace(SETTINGS, camera=camera)))
     assert after.gap_px == before.gap_px
     assert abs(after.u_response_px) < 0.1 * abs(before.u_response_px)
+
+
+def test_a_process_of_its_own_learns_the_same_camera(recording: Recording) -> None:
+    film = list(CLASSES["linear"](recording))
+    here, beside = camera_of(film, SETTINGS, SCALE), camera_beside(film, SETTINGS, SCALE)
+    assert beside.response.curve is here.response.curve
+    assert [other.weight for other in beside.response.others] == [other.weight for other in here.response.others]
+    assert (beside.point_spread, beside.discrepancy, beside.lag) == (here.point_spread, here.discrepancy, here.lag)
 
 
 def test_a_camera_that_sharpens_is_not_corrected_and_said(recording: Recording) -> None:
