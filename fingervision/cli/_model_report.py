@@ -1,7 +1,6 @@
 """Remarks of the `model` command: how long the flexures last, what yields, what touches, and what a model omits."""
 
 from collections.abc import Mapping, Sequence
-from math import copysign, isfinite
 from typing import Any
 
 import click
@@ -9,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.domain.gripper import Gripper
-from fingervision.models.answer_figures import ModelFigures
+from fingervision.domain.gripper import Gripper, Material
+from fingervision.models.answer_figures import LoadedState, ModelFigures
 from fingervision.models.elastic_mechanism import MechanismState
-from fingervision.models.gripper_figures import Endurance, endurance, input_at_yield_mm, life_between
+from fingervision.models.gripper_figures import input_at_yield_mm, life_over
 from fingervision.models.kinds import by_trust, small_displacements_alone
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import MechanismModel
@@ -35,7 +34,8 @@ def say_what_limits(
         if hasattr(models[kind], "loaded"):
             _warn_of_stress(gripper, models[kind], inputs)
             if not as_json:
-                _say_endurance(gripper, kind, models[kind], inputs)
+                ends = models[kind].loaded([float(inputs.min()), float(inputs.max())])
+                say_endurance(kind, gripper.material, ends, "hinge")
             onset = figures[kind].contact_input_mm
             if onset is not None and not physics.contact and inputs.min() < onset * (1.0 + 1e-9):
                 click.echo(
@@ -51,17 +51,6 @@ def say_what_limits(
             click.echo(f"Note: the model kind {kind} always computes small displacements without contact.")
         if kind == "stiffness_matrix" and figures[kind].out_of_plane_modes_hz:
             click.echo(_out_of_plane_limit(gripper, figures[kind]))
-
-
-def _say_endurance(gripper: Gripper, kind: str, model: Any, inputs: NDArray[np.float64]) -> None:
-    ends = model.loaded([float(inputs.min()), float(inputs.max())])
-    life = life_between(gripper, *((s.input_mm, s.gap_mm, s.force_n, s.grip_n, s.stress_mpa) for s in ends))
-    if life is not None:
-        click.echo(
-            f"Endurance between {ends[0].input_mm:.3g} and {ends[1].input_mm:.3g} mm ({kind}, the material's S-N line, "
-            f"no scatter): {life.words}; the stress in the hinge changes by +-{life.amplitude_mpa:.3g} MPa about "
-            f"{life.mean_mpa:.3g} MPa."
-        )
 
 
 def _out_of_plane_limit(gripper: Gripper, figures: ModelFigures) -> str:
@@ -148,24 +137,19 @@ def add_endurance(mechanism: Mechanism, states: Sequence[MechanismState], figure
 
     The stress is assumed to change its sign with the input.
     """
-    life = _life(mechanism, states)
+    life = life_over(mechanism.material, states)
     if life is not None and life.cycles is not None:
         figures["endurance_cycles"] = life.cycles
 
 
-def _life(mechanism: Mechanism, states: Sequence[MechanismState]) -> Endurance | None:
-    if not isfinite(states[0].stress_mpa):
-        return None
-    ends = sorted(copysign(state.stress_mpa, state.input_mm) for state in (states[0], states[-1]))
-    return endurance(mechanism.material, ends[0], ends[1])
-
-
-def say_endurance(kind: str, mechanism: Mechanism, states: Sequence[MechanismState]) -> None:
+def say_endurance(
+    kind: str, material: Material, states: Sequence[LoadedState | MechanismState], where: str = "flexures"
+) -> None:
     """Print the number of load cycles that the flexures endure over the range of inputs."""
-    life = _life(mechanism, states)
+    life = life_over(material, states)
     if life is not None:
         click.echo(
             f"Endurance between {states[0].input_mm:.3g} and {states[-1].input_mm:.3g} mm ({kind}, the material's S-N "
-            f"line, no scatter): {life.words}; the stress in the flexures changes by "
+            f"line, no scatter): {life.words}; the stress in the {where} changes by "
             f"+-{life.amplitude_mpa:.3g} MPa about {life.mean_mpa:.3g} MPa."
         )

@@ -20,7 +20,7 @@ from scipy.sparse import csr_matrix, identity
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper, PointMm
 from fingervision.models.answer_figures import ModelFigures
-from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStress
+from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStress, changes
 from fingervision.models.flexure_span import used_in_plate
 from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.gripper_model import DrawnGripper, ModelErrors
@@ -273,11 +273,8 @@ class MechanismPlate(ElasticMechanism):
     @cached_property
     def pair_rows(self) -> dict[str, Array]:
         """Vectors that convert small displacements to the change of each pair's distance, shape (unknowns,) each."""
-        found = {}
-        for name, (a, b) in self.mechanism.pairs.items():
-            apart = np.array(self.mechanism.probes[b]) - self.mechanism.probes[a]
-            found[name] = apart @ (self.probe_rows[b] - self.probe_rows[a]) / np.hypot(*apart)
-        return found
+        rows = changes(self.mechanism, self.probe_rows)
+        return {name: rows[f"{name}_mm"] for name in self.mechanism.pairs}
 
     def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
         """Lines of the outline for plotting."""

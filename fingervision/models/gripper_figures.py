@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from math import copysign, exp, log
+from math import copysign, exp, isfinite, log
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper, Material, SNLine
 from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress
+from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import mechanical_advantage
 from fingervision.models.gripper_model import DrawnGripper
@@ -252,7 +253,7 @@ def gripper_figures(
     for end, load in zip(("lowest", "highest"), loads, strict=True):
         names = (f"{end}_input_mm", f"{end}_gap_mm", f"{end}_force_n", f"{end}_grip_n", f"{end}_stress_mpa")
         row |= dict(zip(names, load, strict=True))
-    life = None if peak is None else life_between(gripper, loads[0], loads[1])
+    life = None if peak is None else life_over(gripper.material, states)
     row["endurance_cycles"] = None if life is None else life.cycles
     row |= {
         "model_error_slope_percent": 100.0 * figures.slope_error,
@@ -267,13 +268,15 @@ def gripper_figures(
     return row
 
 
-def life_between(gripper: Gripper, low: Sequence[float | None], high: Sequence[float | None]) -> Endurance | None:
-    """Endurance of the hinges for a cycle between two states of load (input, gap, force, grip, stress).
+def life_over(material: Material, states: Sequence[LoadedState | MechanismState]) -> Endurance | None:
+    """Endurance of the flexures for a cycle between the first and the last of some states; None without a stress.
 
     In each state, the stress is taken as positive if the input is positive, and else as negative.
     """
-    ends = sorted(copysign(load[4] or 0.0, load[0] or 0.0) for load in (low, high))
-    return endurance(gripper.material, ends[0], ends[1])
+    if not isfinite(states[0].stress_mpa):
+        return None
+    ends = sorted(copysign(state.stress_mpa, state.input_mm) for state in (states[0], states[-1]))
+    return endurance(material, ends[0], ends[1])
 
 
 def unit_of(name: str) -> str:

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 SHARE_UNCERTAINTY = 0.05
 """Standard uncertainty of the weight w of plane strain. The bending stiffness is within 0.42 % of brick elements
-between elastic blocks for width over thickness 1 to 20 and t / R 0.0125 to 0.5 (`tests/benchmarks/models_width.py`),
-which is 0.04 of w at nu = 0.34. The resulting uncertainty of the force is 0.05 nu^2, 0.6 %."""
+between elastic blocks for width over thickness 1 to 20 and t / R 0.0125 to 0.5, which is 0.04 of w at nu = 0.34
+(`tests/models/test_thin_necks.py` holds it). The resulting uncertainty of the force is 0.05 nu^2, 0.6 %."""
 
 
 @dataclass(frozen=True, slots=True)
