@@ -230,6 +230,9 @@ class Effect:
     narrow : callable or None
         Function for bounds that depend on the data: `narrow(history)` returns the parameters to search, or the reason
         why these data cannot show the effect.
+    inexact : callable or None
+        Function `inexact(values)` for an effect whose formula is a stand-in: it returns parameter values, also such as
+        are no parameters, each of which differs from the given ones by a standard deviation of the formula's error.
     foretold : mapping of str to (float, float)
         Ranges of the effect's parameters that follow from a drawing; empty if the drawing determines none.
     checks : mapping of FurtherCheck to bool
@@ -280,6 +283,7 @@ class Effect:
     start: str = ""
     curve: bool = False
     narrow: Callable[[History], "tuple[Parameter, ...] | str"] | None = None
+    inexact: Callable[[Values], tuple[Values, ...]] | None = None
     foretold: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
     checks: Mapping[FurtherCheck, bool] = field(default_factory=lambda: MappingProxyType({}))
     stands_at: tuple[str, ...] = ()

@@ -16,6 +16,8 @@ def low_pass(signal: Array, time_s: Array, tau_s: float, start: float) -> Array:
 
 
 TAUS_S = (1, 4, 16, 64)
+BETWEEN_S = (2, 8, 32)
+"""Time constants in the middle of two others: a body that creeps with one of them creeps with neither of the two."""
 SLOWER = 2.0
 """Smallest ratio of time constant to dwell at which creep is visible. The dwell before a reading is assumed to be half
 of the time between two readings; creep with a shorter time constant depends on when exactly the stage arrived."""
@@ -25,7 +27,7 @@ def act(response: Response, history: History, values: Values) -> Response:
     """Apply the effect: the opening continues to change under a constant input."""
     opening_mm = response.gap_mm - history.rest_gap_mm
     crept_mm = opening_mm.copy()
-    for tau_s in TAUS_S:
+    for tau_s in (*TAUS_S, *BETWEEN_S):
         fraction = values.get(f"fraction_{tau_s}s", 0.0)
         if fraction != 0.0:
             for index, run in enumerate(history.runs):
@@ -35,6 +37,17 @@ def act(response: Response, history: History, values: Values) -> Response:
                     opening_mm[run] - low_pass(opening_mm[run], history.times[run], float(tau_s), relaxed_mm)
                 )
     return response.with_gap(history.rest_gap_mm + crept_mm)
+
+
+def inexact(values: Values) -> tuple[Values, ...]:
+    """Creep whose time constants lie between two of the formula's, for as much as creeps with these two."""
+    found = []
+    for before, between, after in zip(TAUS_S, BETWEEN_S, TAUS_S[1:], strict=False):
+        shares = {f"fraction_{tau_s}s": values.get(f"fraction_{tau_s}s", 0.0) for tau_s in (before, after)}
+        both = sum(shares.values())
+        less = {name: share - 0.5 * both for name, share in shares.items()}
+        found.append({**values, **less, f"fraction_{between}s": both})
+    return tuple(found)
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
@@ -66,6 +79,7 @@ EFFECT = PointEffect(
     memory=True,
     start="opening to which the body had relaxed before the run, minus its first opening, over the largest opening",
     narrow=narrow,
+    inexact=inexact,
     demonstrated=True,
     act=act,
 )

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.diagnosis.inference.explanation_candidates import within_a_step, without_roundings
-from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.evidence import follows_the_input, speaks_for
+from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.search import problem_of
 from fingervision.diagnosis.input.preparation import prepare
@@ -58,27 +58,26 @@ def encoder_problem(folder: Path, play_mm: float, offset_mm: float = 0.0) -> Pro
     return problem_of(data, None)
 
 
-@pytest.mark.parametrize(("short_mm", "hidden"), [(0.02, True), (0.2, False)])
-def test_a_stop_within_a_step_of_the_end_is_rounding_beside_friction_too(
-    tmp_path: Path, short_mm: float, hidden: bool
-) -> None:
-    # The stage rests at its upper end; friction also acts after the stop, far from the end of the range.
+def test_a_stop_within_a_step_of_the_end_is_no_evidence(tmp_path: Path) -> None:
+    # The stage rests at its upper end, and an encoder rounds all readings of a rest alike.
     problem = encoder_problem(tmp_path, 0.0)
     smooth_mm = problem.chain.history.input_mm
-    values = {
-        "end_stop": {"upper_mm": smooth_mm.max() - short_mm, "lower_mm": smooth_mm.min() - 1.0},
-        "friction_hysteresis": {"fraction": 0.9, "reach_mm": 0.05},
-    }
-    found = Explanation(tuple(values), values, 0.0, problem.measured, np.zeros((4, 4)), 4, (0.0,))
-    assert within_a_step(problem, found) is hidden
+    ends = {"upper_mm": smooth_mm.max() - 0.02, "lower_mm": smooth_mm.min() - 1.0}
+    stop = fit(problem, ("end_stop",), {"end_stop": ends}, iterations=20)
+    assert not speaks_for(problem, [stop], problem.nothing())
 
 
-@pytest.mark.parametrize(("offset_mm", "left"), [(-0.011, ("backlash",)), (0.1, ("input_offset", "backlash"))])
-def test_what_only_follows_roundings_is_dropped(tmp_path: Path, offset_mm: float, left: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(("offset_mm", "follows"), [(-0.011, True), (0.1, False)])
+@pytest.mark.parametrize("added", ["input_offset", "drive_lag"])
+def test_what_changes_less_than_roundings_do_is_no_second_effect(
+    tmp_path: Path, added: str, offset_mm: float, follows: bool
+) -> None:
     # The zero of the encoder has an error of 11 um, to which an offset of the stage is added with either sign.
     problem = encoder_problem(tmp_path, 0.1, offset_mm)
-    begin = {"drive_lag": {"delay_s": 0.02}, "input_offset": {"offset_mm": 0.01}, "backlash": {"play_mm": 0.08}}
-    assert without_roundings(problem, fit(problem, tuple(begin), begin)).names == left
+    base = fit(problem, ("backlash",), {"backlash": {"play_mm": 0.08}}, iterations=20)
+    begin = {"drive_lag": {"delay_s": 0.02}, "input_offset": {"offset_mm": 0.01}}
+    both = fit(problem, (added, "backlash"), {added: begin[added], **base.values}, iterations=20)
+    assert follows_the_input(problem, both, base) is (follows or added == "drive_lag")
 
 
 def test_the_rounding_of_a_reversal_does_not_widen_a_play(tmp_path: Path) -> None:

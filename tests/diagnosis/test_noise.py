@@ -141,3 +141,15 @@ def test_noise_stays_possible_as_noise(rho: float) -> None:
     most = [most_noise(drawn(rng, at.size, rho), at, (slice(0, at.size),), 0.0) for _ in range(DRAWS)]
     assert np.median(most) > 0.9
     assert min(most) > 0.5
+
+
+def test_rows_beside_the_jumps_of_an_explanation_are_no_outliers() -> None:
+    rng, jumps = np.random.default_rng(7), np.arange(12, 228, 10)
+    change = np.cumsum(np.isin(np.arange(240), jumps).astype(float))
+    late = rng.choice(jumps, 11, replace=False)
+    residual, input_mm = 0.001 * rng.standard_normal(240), rng.permutation(np.linspace(0.0, 1.0, 240))
+    residual[late] += 1.0
+    residual[[5, 133]] += 0.4
+    runs = (slice(0, 240),)
+    assert np.flatnonzero(gate(residual, input_mm, runs, True, 4.5, change)).tolist() == [5, 133]
+    assert np.flatnonzero(gate(residual, input_mm, runs, True, 4.5)).tolist() == sorted([5, 133, *late.tolist()])

@@ -1,14 +1,14 @@
 """Expected discrimination of a run: the chi-square by which it is expected to separate two explanations."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from fingervision.diagnosis.design.augmented_dataset import REFITTED, AugmentedDataset
+from fingervision.diagnosis.inference.evidence import noise_doubt
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.channel_noises import SHORT_RUN
 from fingervision.diagnosis.noise.noise_model import Noise, without_input
@@ -72,35 +72,9 @@ PROMISED = 0.95
 """Coverage probability of the stated interval of a gain."""
 REZEROED = 0.5
 """Prior probability that the run has an offset relative to the data."""
-KEPT = (0.7, 1.3)
-"""Range of (actual gain / predicted gain) in which a prediction counts as fulfilled."""
-MODERATE, SURELY = 75.0, 0.8
-"""Gain above which a prediction counts as sound only if it is fulfilled with at least this probability."""
-
-
-@dataclass(frozen=True, slots=True)
-class ExpectedGain:
-    """Predicted chi-square gain of a run: its most probable value, an interval, and the probability of that value.
-
-    If one explanation is true, the gain often differs from the gain if the other explanation is true. The median gain
-    over both explanations would lie between the two gains, where hardly any gain occurs. `modest` is the most probable
-    of the gains below `MODERATE`. All gains are differences in chi-square.
-    """
-
-    gain: float
-    kept: float
-    modest: float
-    interval: tuple[float, float]
-
-    @property
-    def sound(self) -> bool:
-        """Whether the predicted gain is moderate or, if it is large, will probably be reached."""
-        return self.gain < MODERATE or self.kept >= SURELY
-
-    @property
-    def stated(self) -> float:
-        """The gain in chi-square that the report states for the proposed run."""
-        return self.gain if self.sound else self.modest
+MOST = 75.0
+"""Largest gain that is stated unless a larger one is nearly certain: which of two explanations is true, and where a
+contact or stop acts, may change it by a factor of a thousand, and more than this decides in any case."""
 
 
 def expected_gain(
@@ -113,7 +87,7 @@ def expected_gain(
     rng: np.random.Generator,
     *,
     rezeroed: bool = False,
-) -> ExpectedGain:
+) -> tuple[float, tuple[float, float]]:
     """Predict the gain of a run from its posterior predictive distribution given the measured data.
 
     For each draw, a true explanation and noise are drawn from the posterior, the run is simulated with them, and both
@@ -136,6 +110,13 @@ def expected_gain(
         Generator of the noise.
     rezeroed : bool
         Whether the stage is re-zeroed before the run.
+
+    Returns
+    -------
+    gain : float
+        Median of the gain; at most `MOST`, or the lower limit of the interval.
+    interval : tuple of float
+        Limits between which the gain lies with the probability `PROMISED`.
     """
     count = TRUTHS if problem.chain.history.input_mm.size + input_mm.size <= MANY_SAMPLES else FEW_TRUTHS
     gains: list[float] = []
@@ -156,22 +137,8 @@ def expected_gain(
     mean = np.maximum(np.array(gains), 0.0)
     drawn = mean[rng.choice(mean.size, NOISES, p=np.array(chances) / sum(chances))]
     come = drawn + 2.0 * np.sqrt(drawn) * rng.standard_normal(NOISES)
-    low, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5 + 0.5 * PROMISED))
-    return ExpectedGain(*surest(come), surest(come, MODERATE)[0], (float(low), float(high)))
-
-
-def surest(come: Array, below: float = np.inf) -> tuple[float, float]:
-    """The gain, below a limit, near which most posterior draws lie, and the share of draws near it.
-
-    If no posterior draw is below the limit, the median of all draws is returned.
-    """
-    come = np.sort(come)
-    named = come[(come > 0.0) & (come < below)]
-    if named.size == 0:
-        return min(float(np.median(come)), below), 0.0
-    counts = np.searchsorted(come, KEPT[1] * named, "right") - np.searchsorted(come, KEPT[0] * named, "left")
-    best = int(np.argmax(counts))
-    return float(named[best]), float(counts[best] / come.size)
+    low, middle, high = np.quantile(come, (0.5 - 0.5 * PROMISED, 0.5, 0.5 + 0.5 * PROMISED)).tolist()
+    return max(low, min(middle, MOST)), (low, high)
 
 
 def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[float, ...]:

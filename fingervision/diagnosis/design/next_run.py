@@ -1,17 +1,15 @@
 """Propose the next run by the expected noncentrality per minute (T-optimality, Atkinson & Fedorov 1975)."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 
 from fingervision.diagnosis.design.augmented_dataset import PAUSE_S, REFITTED, AugmentedDataset
-from fingervision.diagnosis.design.expected_gain import MODERATE, ExpectedGain, expected_gain
+from fingervision.diagnosis.design.expected_gain import MOST, expected_gain
 from fingervision.diagnosis.design.next_look import WORTH, static_check
 from fingervision.diagnosis.design.protocols import (
     REZERO,
-    SAMPLES_A_STROKE,
     Step,
     driven,
     measured_ends,
@@ -19,7 +17,7 @@ from fingervision.diagnosis.design.protocols import (
     repeated,
     rounding_s,
 )
-from fingervision.diagnosis.inference.ambiguity_set import surprise
+from fingervision.diagnosis.inference.evidence import surprise
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.posterior import draws
@@ -46,8 +44,6 @@ LIKELY = 0.02
 """Smallest probability, relative to the most probable explanation, of an explanation that is assumed true."""
 SCREENED = 4
 """Iterations of a rival's refit while many runs are compared."""
-SMALLER = ((0.65, SAMPLES_A_STROKE), (0.4, SAMPLES_A_STROKE), (0.65, 6), (0.4, 6), (0.25, 6), (0.12, 6))
-"""Reduced runs in the order in which they are tried: share of the range, and least number of samples per stroke."""
 ALIKE = 0.03
 """Difference in the share of decided pairs below which two runs count as equally good."""
 
@@ -185,29 +181,10 @@ class RunChoice:
         _, _, times, once = min((each for each in found if each[0] >= top - ALIKE), key=lambda each: each[1])
         return self.planned(once.name, repeated(once.steps, times), REFITTED, times)
 
-    def smaller(self, plan: RunPlan) -> Iterator[RunPlan]:
-        """Reduce repetitions, then range and number of samples, as long as the run decides the same pairs.
-
-        Small motions spare the gripper, and the additional gain of a large motion depends more on the explanations'
-        formulas than on the measured data.
-        """
-        low, high = float(plan.input_mm.min()), float(plan.input_mm.max())
-        half, middle = 0.5 * (high - low), 0.5 * (low + high)
-        least = self.settled(plan.gains, BARELY) - ALIKE
-        tries = [(plan.times // 2**k, 1.0, SAMPLES_A_STROKE) for k in range(1, plan.times.bit_length())]
-        tries += [(1, *less) for less in SMALLER]
-        for times, share, samples in tries:
-            ends = middle - share * half, middle + share * half
-            named = dict(protocols(*ends, self.step_s, samples))
-            less = self.planned(plan.name, repeated(named[plan.name], times), REFITTED, times)
-            if less is not None and self.settled(less.gains, BARELY) >= least:
-                yield less
-
 
 def open_set(problem: Problem, members: list[Explanation]) -> OpenSet:
     """Order the indistinguishable explanations by their probability given the data; the best one stays first."""
-    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
-    cost = {id(e): e.bic(rows) + surprise(problem, e) for e in members}
+    cost = {id(e): e.bic + surprise(problem, e) for e in members}
     best, others = members[0], sorted(members[1:], key=lambda e: cost[id(e)])[:MOST_RIVALS]
     listed = [best, *others]
     costs = np.array([cost[id(e)] for e in listed])
@@ -265,39 +242,25 @@ def next_run(
 def _promised(
     choose: RunChoice, plan: RunPlan, members: list[Explanation], found: tuple[Point, ...], rng: np.random.Generator
 ) -> NextRun | None:
-    """Predict the gain of a run; if a large predicted gain would be unreliable, reduce the run."""
+    """State the run, and the gain that it promises."""
     listed, odds = choose.open.members, choose.open.odds
-    walks: dict[int, tuple[Point, ...]] = {0: found}
-
-    def stated(run: RunPlan, pair: tuple[int, int]) -> ExpectedGain:
-        j, k = pair
-        for each in pair:
-            if each not in walks:
-                walks[each] = draws(choose.problem, listed[each], rng)
-        share = float(odds[j] / (odds[j] + odds[k]))
-        both, chance, drawn = (listed[j], listed[k]), (share, 1.0 - share), (walks[j], walks[k])
-        rezeroed = REZERO in run.steps
-        return expected_gain(choose.data, choose.problem, run.input_mm, both, chance, drawn, rng, rezeroed=rezeroed)
-
     worst = choose.least(plan)
     if worst is None:
         return None
-    separated = worst[1]
-    promised = stated(plan, separated)
-    for less in choose.smaller(plan) if not promised.sound else ():
-        worst = choose.least(less)
-        if worst is not None and worst[0] < MODERATE:
-            again = stated(less, worst[1])
-            if again.sound:
-                plan, separated, promised = less, worst[1], again
-                break
-    j, k = separated
+    j, k = separated = worst[1]
+    first, second = (found if each == 0 else draws(choose.problem, listed[each], rng) for each in separated)
+    share = float(odds[j] / (odds[j] + odds[k]))
+    both, chance = (listed[j], listed[k]), (share, 1.0 - share)
+    gain, interval = expected_gain(
+        choose.data, choose.problem, plan.input_mm, both, chance, (first, second), rng, rezeroed=REZERO in plan.steps
+    )
     pair = ("+".join(listed[j].names), "+".join(listed[k].names))
-    words = f"{plan.name}: it separates {' from '.join(pair)} by an expected chi-square of {promised.stated:.0f}"
+    size = f"{gain:.0f}{' or more' * (gain >= MOST)}"
+    words = f"{plan.name}: it separates {' from '.join(pair)} by an expected chi-square of {size}"
     leading = "+".join(listed[0].names)
     apart = [e for i, e in enumerate(listed) if i and plan.apart(0, i) >= WORTH]
     also = ["+".join(e.names) for e in apart if separated != (0, listed.index(e))]
     left = ["+".join(e.names) for e in members[1:] if all(e is not one for one in apart)]
     words += f", and {leading} from {', '.join(also)}" if also else ""
     words += f"; none of the candidate protocols separates {leading} from {', '.join(left)}." if left else "."
-    return NextRun(plan.name, tuple(plan.steps), promised.stated, promised.interval, pair, words)
+    return NextRun(plan.name, tuple(plan.steps), gain, interval, pair, words)

@@ -1,1 +1,1 @@
-"""Inference: hypothesis fits, significance, ambiguity set and model adequacy, which lead to the verdict."""
+"""Inference: hypothesis fits, posterior odds, ambiguity set and model adequacy, which lead to the verdict."""

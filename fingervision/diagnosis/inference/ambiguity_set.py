@@ -1,20 +1,15 @@
 """Ambiguity set: all minimal explanations that the data cannot distinguish from the best one."""
 
-from math import comb
-
 import numpy as np
 
+from fingervision.diagnosis.inference.evidence import STRONG, noise_doubt, odds
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
-from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
 
 INDISTINGUISHABLE = 12.0
 """Chi-square below which two explanations count as indistinguishable. A distance of 4 from the truth must be detected,
 and the estimate from which the distance is measured deviates from the truth by 1.5 standard deviations: (sqrt(4) +
 1.5)^2."""
-FREEDOM = 4.0
-"""Degrees of freedom of Student's t distribution for the physical priors: typical sizes are known only roughly, so that
-the penalty grows slowly far beyond them (Lange, Little & Taylor 1989)."""
 SURELY = 2.05
 """Standard deviations that are allowed for: the true explanation is then lost in one table of fifty."""
 SPARE = 3.0
@@ -26,9 +21,6 @@ OUT_OF_REACH = (400.0, 200.0)
 """Squared distance from the best explanation, and chi-square above it, from which no refit is tried: the explanation is
 20 standard deviations away, and its chi-square is larger by more than any refit has ever gained (ten times
 `INDISTINGUISHABLE` and `ADMISSIBLE`)."""
-STRONG = 6.0
-"""Difference in chi-square below which the odds of two explanations with equally many effects are less than 20 to 1,
-which is no strong evidence (2 ln 20; Kass & Raftery 1995, doi:10.1080/01621459.1995.10476572)."""
 IDLE_SHARE = 0.3
 """Share of the best explanation's gain below which another explanation counts as explaining nothing."""
 
@@ -40,7 +32,6 @@ def ambiguity_set(
     members, distances = [best], {}
     target = problem.whitened(best.values)
     metric = problem.offsets.metric(best.sigma_mm)
-    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
     # If the noise is poorly known, so are all differences in chi-square.
     admissible = ADMISSIBLE * (1.0 + noise_doubt(problem))
 
@@ -82,9 +73,9 @@ def ambiguity_set(
     if len(best.names) == 1:
         # Two effects are an alternative to one effect only if every acceptable single effect is physically less
         # probable.
-        most = min(odds(problem, member, rows) for member in members)
+        most = min(odds(problem, member) for member in members)
         for pair in pairs:
-            if odds(problem, pair, rows) < most:
+            if odds(problem, pair) < most:
                 join(pair)
     return [m for m in members if not any(set(o.names) < set(m.names) for o in members)], distances
 
@@ -136,27 +127,3 @@ def beside_foretold(problem: Problem, members: list[Explanation]) -> list[Explan
         )
 
     return [other for other in members if not any(imitates(other, member) for member in members)]
-
-
-def odds(problem: Problem, explanation: Explanation, rows: int) -> float:
-    """-2 log of the posterior odds: BIC, prior density of the parameters, and prior for the number of alternatives."""
-    return explanation.bic(rows) + surprise(problem, explanation) + choices(problem, explanation)
-
-
-def choices(problem: Problem, explanation: Explanation) -> float:
-    """-2 log of the prior probability of one explanation among all with the same number of effects.
-
-    There are many more pairs than single effects, so that some pair fits well by chance; therefore each number of
-    effects has the same total prior probability (extended BIC, Chen & Chen 2008).
-    """
-    return 2.0 * float(np.log(comb(len(problem.effects), len(explanation.names))))
-
-
-def surprise(problem: Problem, explanation: Explanation) -> float:
-    """-2 log of the ratio of the parameters' prior density to the density at the prior's centre."""
-    return sum(
-        (FREEDOM + 1.0) * float(np.log1p(((value - (p.neutral or 0.0)) / p.typical) ** 2 / FREEDOM))
-        for name, p in problem.parameters(explanation.names)
-        if p.typical is not None
-        for value in [explanation.values[name][p.name]]
-    )

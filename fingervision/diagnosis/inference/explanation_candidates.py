@@ -1,15 +1,13 @@
 """Candidate explanations of one to three effects: ranked by linear signatures, then refitted jointly."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from itertools import permutations
 
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit, scan
-from fingervision.diagnosis.inference.null_bootstrap import LONG
+from fingervision.diagnosis.inference.hypothesis_fit import fit, scan
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
-from fingervision.diagnosis.input.record_nuisances import below_the_input
 from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
 
@@ -23,18 +21,12 @@ several local minima."""
 REFINED = 8
 """Number of extensions that are refitted thoroughly: in tests, no extension with a lower rank after seven steps ever
 became the best."""
-PROMISE = 0.5
-"""Share of the required gain that a signature must have before its refit is tried. A refit between the grid points
-gains at most a fifth more (`REFIT_MARGIN`), and joint refitting with earlier effects seldom twice as much."""
+LONG = 6000
+"""Number of samples above which sizes of a jump are scanned in addition to one explanation only."""
 LEAST_GAIN = 4.0
 """Least chi-square gain of an effect's signature for which a refit is tried."""
-FEW_ROWS = 0.1
-"""Share of the rows affected by an end stop or a contact below which only the ends of strokes give evidence for it; on
-more rows, the encoder's rounding averages out."""
 ALIKE = 12.0
 """Squared whitened distance below which two predictions count as equal, as in the ambiguity set."""
-STEPS_HIDDEN = 1.0
-"""Encoder steps below which an effect is indistinguishable from rounding."""
 FINEST, COARSEST = 0.003, 0.02
 """Smallest and largest relative spacing of the sizes that are tried for a jump: at most two thousand sizes, and at
 least as many as signatures."""
@@ -87,7 +79,6 @@ def extended(
     *,
     scanned: int = SCANNED,
     refined: int = REFINED,
-    asked: Mapping[str, float] | None = None,
 ) -> list[Explanation]:
     """Add each effect to each base explanation: start from signatures in the base's residual, then refit jointly.
 
@@ -103,9 +94,6 @@ def extended(
         Called with the share of the work that is done.
     scanned : int
         Number of base explanations to which an effect with jumps is added at all its sizes.
-    asked : mapping of str to float or None
-        Least significant gain in chi-square of each effect. Extensions whose signatures promise less than half of this
-        gain are not refitted. None to try all.
     """
     owner = np.array(atoms.names)
     planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
@@ -117,13 +105,12 @@ def extended(
             mine = np.flatnonzero(owner == name)
             if name in base.names or not mine.size:
                 continue
-            least = LEAST_GAIN if asked is None else max(LEAST_GAIN, PROMISE * asked.get(name, 0.0))
             if place < scanned and any(parameter.rugged for _, parameter in problem.parameters((name,))):
                 start, score = scan(problem, base, name, [atoms.starts[k] for k in mine])
-                if base.score - score > least:
+                if base.score - score > LEAST_GAIN:
                     planned.append((score, base, name, start))
             k = int(mine[np.argmax(gain[mine])])
-            if gain[k] > least:
+            if gain[k] > LEAST_GAIN:
                 planned.append((base.score - float(gain[k]), base, name, atoms.begin(k, float(coefficient[k]))))
     planned.sort(key=lambda plan: plan[0])
     found: dict[tuple[str, ...], Explanation] = {}
@@ -189,79 +176,17 @@ def different(problem: Problem, explanations: list[Explanation], most: int) -> l
     return found
 
 
-def added_share(problem: Problem, smaller: Explanation, larger: Explanation) -> float:
-    """Change of the prediction by the additional part of the larger explanation, as a share of the total change."""
-    bare, before, after = (problem.chain.stacked(values) for values in ({}, smaller.values, larger.values))
-    if below_the_input(problem, float(np.sqrt(np.mean((after - before) ** 2)))):
-        return 0.0
-    return float(np.linalg.norm(after - before) / max(1e-12, float(np.linalg.norm(after - bare))))
-
-
-def within_a_step(problem: Problem, explanation: Explanation) -> bool:
-    """Whether one of the effects acts like rounding: by less than an encoder step, on few rows or at stroke ends.
-
-    Each effect is judged alone, because an effect with memory that acts together with another effect also changes later
-    rows.
-    """
-    history = problem.chain.history
-    if history.input_step_mm == 0.0:
-        return False
-    reach = 0.5 * history.input_step_mm
-    low, high = (problem.chain.with_input(history.input_mm + way).stacked({}) for way in (-reach, reach))
-    step_mm = STEPS_HIDDEN * float(np.max(np.abs(high - low)))
-    from_end = np.minimum(history.input_mm - history.input_mm.min(), history.input_mm.max() - history.input_mm)
-    at_ends = np.tile(from_end < STEPS_HIDDEN * history.input_step_mm, low.size // from_end.size)
-    bare = problem.chain.stacked({})
-    for name in explanation.names:
-        change = np.abs(problem.chain.stacked({name: explanation.values[name]}) - bare)
-        largest = float(np.max(change))
-        acts = change > 0.1 * largest
-        if largest < step_mm and (float(np.mean(acts)) < FEW_ROWS or not np.any(acts & ~at_ends)):
-            return True
-    return False
-
-
-def beyond_the_input(problem: Problem, smaller: Explanation, larger: list[Explanation]) -> list[Explanation]:
-    """Keep the explanations whose change of the prediction exceeds the error of the recorded input.
-
-    Explanations with a smaller change are dropped, because they only follow the rounding errors of an encoder. For
-    example, a delay within one step of an encoder gained 225 in chi-square, and hid an offset and a play that changed
-    the prediction by twenty times as much. If the best of the larger explanations only follows rounding errors of an
-    encoder, others may do so as well. In this case, only explanations that contain all effects of `smaller` are kept.
-    """
-    beyond = [explanation for explanation in larger if added_share(problem, smaller, explanation) > 0.0]
-    if beyond[:1] == larger[:1]:
-        return beyond
-    return [explanation for explanation in beyond if set(smaller.names) <= set(explanation.names)]
-
-
-def without_roundings(problem: Problem, explanation: Explanation) -> Explanation:
-    """Drop an effect if the other effects, refitted alone, predict the same within the recorded input's error.
-
-    For example, in addition to a play and an offset, a delay by a small part of an encoder step only follows rounding
-    errors, whichever of the three effects was found first.
-    """
-    while problem.chain.history.input_sigma_mm > 0.0 and len(explanation.names) > 1:
-        kept = [{n: v for n, v in explanation.values.items() if n != name} for name in explanation.names]
-        fewer = [fit(problem, tuple(values), values, iterations=MANY_STEPS) for values in kept]
-        alike = [one for one in fewer if added_share(problem, one, explanation) == 0.0]
-        if not alike:
-            break
-        explanation = min(alike, key=lambda one: one.score)
-    return explanation
-
-
-def likeliest(candidates: list[Explanation], samples: int) -> Explanation:
+def likeliest(candidates: list[Explanation]) -> Explanation:
     """Choose the explanation with the smallest BIC (Schwarz 1978)."""
-    return min(candidates, key=lambda explanation: explanation.bic(samples))
+    return min(candidates, key=lambda explanation: explanation.bic)
 
 
-def simplest(singles: list[Explanation], samples: int, nothing: Explanation) -> Explanation:
+def simplest(singles: list[Explanation], nothing: Explanation) -> Explanation:
     """Choose one effect; prefer a simpler formula if a richer one gains no more than inexact formulas usually do.
 
     For example, a small gain is no reason to prefer a resonance to a delay by a fraction of a sample.
     """
-    best = likeliest(singles, samples)
+    best = likeliest(singles)
     within = FORM_SHARE**2 * (nothing.score - best.score)
     simpler = [e for e in singles if e.free < best.free and e.score - best.score < within]
     return min(simpler, key=lambda explanation: explanation.score, default=best)

@@ -43,6 +43,8 @@ class Explanation:
         Spread of the run offsets under this explanation, for each channel.
     starts_price : float
         Penalty of the fitted start states: twice the logarithm of prior width over posterior width, summed.
+    rows : int
+        Number of measured values that were not set aside.
     """
 
     names: tuple[str, ...]
@@ -53,10 +55,12 @@ class Explanation:
     free: int
     sigma_mm: tuple[float, ...]
     starts_price: float = 0.0
+    rows: int = 2
 
-    def bic(self, samples: int) -> float:
+    @property
+    def bic(self) -> float:
         """Bayesian information criterion (Schwarz 1978): score plus penalties for free parameters and start states."""
-        return self.score + self.free * float(np.log(samples)) + self.starts_price
+        return self.score + self.free * float(np.log(self.rows)) + self.starts_price
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +94,11 @@ class Problem:
     form_share: float = SMALL_SHARE
     stalled: frozenset[str] = frozenset()
     mapped: float = 0.0
+
+    @property
+    def rows(self) -> int:
+        """Number of measured values that were not set aside as gross errors, at least 2."""
+        return max(2, int(self.measured.size - self.whitener.aside.sum()))
 
     def judged_by(self, whitener: Whitener, aim_mm: Array) -> "Problem":
         """Return the problem with another noise or other outliers; `aim_mm` of shape (m,) is the target."""
@@ -135,4 +144,4 @@ class Problem:
         residual = self.measured - self.whitened({})
         sigma, penalty = self.offsets.spread(residual)
         score = self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
-        return Explanation((), {}, score, residual, np.zeros((0, 0)), 0, sigma)
+        return Explanation((), {}, score, residual, np.zeros((0, 0)), 0, sigma, rows=self.rows)

@@ -320,7 +320,8 @@ def fit(
         covariance=found.covariance(),
         free=int((found.free & own).sum()),
         sigma_mm=spread,
-        starts_price=float(np.sum(np.minimum(prices, np.log(max(2, aim.size))))),
+        starts_price=float(np.sum(np.minimum(prices, np.log(problem.rows)))),
+        rows=problem.rows,
     )
 
 

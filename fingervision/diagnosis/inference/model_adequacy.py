@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingervision.diagnosis.inference.ambiguity_set import choices
+from fingervision.diagnosis.inference.evidence import SURELY, choices, jumps_astray, noise_doubt
 from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.map_identifiability import LINE_SHARE
-from fingervision.diagnosis.inference.null_bootstrap import FEWEST, jumps_astray, linear_thresholds, noise_alone, rare
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
-from fingervision.diagnosis.inference.signatures import derivatives, tangents
+from fingervision.diagnosis.inference.signatures import tangents
 from fingervision.diagnosis.input.record_nuisances import below_the_input
 from fingervision.domain.effect import Array, Flags
 from fingervision.effects import catalogue
@@ -161,7 +159,7 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
         for the choice among all shapes (`choices`).
     """
     several = len(found.names) > 2 and _curved(problem, found) > 1
-    columns, rows = shapes.columns, int(problem.measured.size)
+    columns, rows = shapes.columns, problem.measured.size
     basis = _Basis.of(problem, columns)
     # If the noise is known from repeats, a probe can also represent a play in readings at rest, including the
     # inexactness of the play's formula: such probes are excluded.
@@ -169,20 +167,19 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     barred = _is_an_effect_itself(problem, found, basis) if same else np.zeros(columns.shape[1], dtype=bool)
     each = float(np.log(rows)) + 2.0 * float(np.log(columns.shape[1]))
     ahead = VERY_STRONG if several else -max(VERY_STRONG, problem.form_share**2 * _explained(problem, found))
-    least = found.bic(rows) + choices(problem, found) + ahead
+    least = found.bic + choices(problem, found) + ahead
     best = None
     for base in fewer:
         taken = np.zeros((rows, 0))
-        cost = base.bic(rows) + choices(problem, base)
-        words, added = list[str](), list[Array]()
+        cost = base.bic + choices(problem, base)
+        words = list[str]()
         for _ in range(STAND_INS):
             gain = np.where(barred, 0.0, _gains(problem, basis, base, taken)[0])
             top = int(np.argmax(gain))
             taken = np.hstack([taken, columns[:, top : top + 1]])
-            added.append(shapes.before_whitening(top))
             words.append(shapes.words[top])
             cost += each - float(gain[top])
-            if cost < least and not _differs_by_rounding(problem, found, base, np.stack(added, axis=1)):
+            if cost < least:
                 least, best = cost, " and ".join(words)
     return best
 
@@ -192,31 +189,6 @@ def _curved(problem: Problem, found: Explanation) -> int:
     bare = problem.whitened({})
     alone = [problem.whitened({name: values}) - bare for name, values in found.values.items()]
     return sum(not is_a_line(problem, shape) for shape in alone)
-
-
-def _differs_by_rounding(problem: Problem, found: Explanation, base: Explanation, shapes: Array) -> bool:
-    """Whether an explanation with added shapes differs from the explanation by effects by less than the input's error.
-
-    For example, a step over the input at the first line of an encoder is only an offset, because strokes reverse beyond
-    this line, and the mean position of the stage is then not the position of the line. Differences between explanations
-    in the constants of the runs are ignored.
-
-    Parameters
-    ----------
-    found, base : Explanation
-        The effects, and the explanation to which the shapes are added.
-    shapes : ndarray of float, shape (m, k)
-        Generic shapes, before whitening.
-    """
-    history = problem.chain.history
-    if history.input_sigma_mm == 0.0:
-        return False
-    moves = np.hstack([derivatives(problem, base), shapes]) if base.names else shapes
-    whitened, metric = problem.whitener.columns(moves)[0], problem.offsets.metric(base.sigma_mm)
-    bent = problem.offsets.beside(whitened, metric)
-    size = np.linalg.pinv(whitened.T @ bent) @ (bent.T @ base.residual)
-    differs = problem.chain.stacked(base.values) + moves @ size - problem.chain.stacked(found.values)
-    return below_the_input(problem, _size_in_runs(problem, differs[: history.input_mm.size]))
 
 
 def _size_in_runs(problem: Problem, change: Array) -> float:
@@ -267,29 +239,17 @@ def is_a_line(problem: Problem, shape: Array) -> bool:
     return float(left @ left) < LINE_SHARE * float(shape @ shape)
 
 
-def _of_jumps_astray(problem: Problem, columns: Array, best: Explanation, rng: np.random.Generator) -> float:
-    """Largest gain that a probe can have merely because the recorded input is wrong at jumps."""
-    most, basis = [], _Basis.of(problem, columns)
-    for _ in range(FEWEST):
-        shaken, target = noise_alone(problem, best, rng)
-        alone = fit(shaken, best.names, best.values, target=target, iterations=MANY_STEPS)
-        gains = _gains(shaken, basis, alone, np.zeros((target.size, 0)))[0]
-        most.append(float(np.max(gains)))
-    return rare(most)
-
-
-def remaining_structure(
-    problem: Problem, shapes: Probes, best: Explanation, rng: np.random.Generator
-) -> tuple[str | None, str | None]:
+def remaining_structure(problem: Problem, shapes: Probes, best: Explanation) -> tuple[str | None, str | None]:
     """Test the largest gain among many probes; return unknown structure, or structure that is known to be small."""
     own = harmonics(problem, best)
     gain, dot, norm = _gains(problem, _Basis.of(problem, shapes.columns), best, own.columns)
-    usable = norm > 0.0
-    family = ("probe",) * usable.size
-    threshold = linear_thresholds(problem, family, shapes.columns, best.sigma_mm, rng, usable).get("probe", np.inf)
+    # A shape is one of many, and its size is fitted; the noise is as large as it may be.
+    price = float(np.log(problem.rows)) + 2.0 * float(np.log(shapes.columns.shape[1]))
+    threshold = price * float(np.exp(SURELY * noise_doubt(problem)))
     top = int(np.argmax(gain))
-    if gain[top] > threshold and jumps_astray(problem, best.names):
-        threshold = max(threshold, _of_jumps_astray(problem, shapes.columns, best, rng))
+    if jumps_astray(problem, best.names):
+        # A jump that went astray, and all that follow it, are a noise of their own level.
+        gain = gain * min(1.0, problem.rows / best.score)
     if gain[top] <= threshold:
         return None, own.words if own.gain > threshold else None
     size_mm = _size_in_runs(problem, float(dot[top]) / float(norm[top]) * shapes.before_whitening(top))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom
 
-from fingervision.diagnosis.inference.ambiguity_set import STRONG, choices
+from fingervision.diagnosis.inference.evidence import STRONG, choices
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
@@ -113,8 +113,7 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
 
 def _physical(problem: Problem, rivals: Sequence[Explanation]) -> float:
     """-2 log odds of the most probable explanation by effects."""
-    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
-    return min(rival.bic(rows) + choices(problem, rival) for rival in rivals)
+    return min(rival.bic + choices(problem, rival) for rival in rivals)
 
 
 def _moved(data: Observations) -> Array:

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingervision.diagnosis.inference.ambiguity_set import odds
+from fingervision.diagnosis.inference.evidence import noise_doubt, odds
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, START_VARIANCE, Explanation, Point, Problem
-from fingervision.diagnosis.inference.null_bootstrap import noise_doubt
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
@@ -255,9 +254,8 @@ def beside_alternatives(problem: Problem, best: Explanation, alternatives: Seque
     others = [e for e in alternatives if e.names and e.names != best.names]
     if not own or not others:
         return best
-    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
     # The noise, and the path, may have been estimated anew since the alternatives were fitted.
-    against = np.array([odds(problem, replace(e, score=problem.score(e.values)), rows) for e in (best, *others)])
+    against = np.array([odds(problem, replace(e, score=problem.score(e.values))) for e in (best, *others)])
     weights = np.exp(-0.5 * (against - against.min()))
     has = np.array([[name in e.names for name, _ in own] for e in (best, *others)])
     away = [[e.values[n][p] - best.values[n][p] if n in e.names else 0.0 for n, p in own] for e in others]

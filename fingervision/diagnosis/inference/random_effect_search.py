@@ -140,7 +140,7 @@ def _contested(state: Searched, reason: str) -> Searched:
     example, a drive that sags under gravity, driven one way for six seconds, was taken for a creep of 16 s.
     """
     found = state.found
-    if found.unknown is not None or not found.best.names or standing_of(state.data, found).is_noise:
+    if not found.best.names or standing_of(state.data, found).is_noise:
         return state
     likelier = _likelier(found, likeliest_map, LEAST_GAIN, _acting_in_time(found))
     if likelier is None:
@@ -176,7 +176,6 @@ def _likelier(
     gain. `others` are further explanations with which the random effect is tried.
     """
     problem = found.problem
-    rows = max(2, int(problem.measured.size - problem.whitener.aside.sum()))
     singles = different(problem, list(found.singles), BESIDE)
     tried = []
     begins = (found.nothing, _line(problem), *singles, *([found.best] if least > 0.0 else []))
@@ -188,10 +187,10 @@ def _likelier(
             known = _refitted(_beside(problem, effect), known)
             effect, _ = estimated(problem, _left(problem, known))
         known = _refitted(_beside(problem, effect), known)
-        tried.append((known.bic(rows) + effect.price, known, effect))
+        tried.append((known.bic + effect.price, known, effect))
     cost, known, effect = min(tried, key=lambda one: one[0])
-    rival = found.best if least < 0.0 else min(found.best, found.nearest, key=lambda e: e.bic(rows))
-    if cost > rival.bic(rows) - least:
+    rival = found.best if least < 0.0 else min(found.best, found.nearest, key=lambda e: e.bic)
+    if cost > rival.bic - least:
         return None
     return (known if known.names else None), effect
 
@@ -239,9 +238,8 @@ def _does_more(beside: Searched) -> bool:
 def _gained(state: Searched, beside: Searched, effect: RunGains | PositionMap) -> float:
     """Decrease of -2 log likelihood by a random effect and the effects found with it, minus the penalty for it."""
     plain = replace(_without(beside.found.problem, effect), effects=state.found.problem.effects)
-    rows = max(2, int(plain.measured.size - plain.whitener.aside.sum()))
     rivals = [_refitted(plain, one) for one in (state.found.best, state.found.nearest)]
-    return min(rival.bic(rows) for rival in rivals) - beside.found.best.bic(rows) - effect.price
+    return min(rival.bic for rival in rivals) - beside.found.best.bic - effect.price
 
 
 def _excluding(data: Observations, reasons: dict[str, str]) -> Observations:

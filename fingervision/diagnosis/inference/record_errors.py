@@ -4,10 +4,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from fingervision.diagnosis.inference.hypothesis import START_VARIANCE, Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
-from fingervision.diagnosis.inference.null_bootstrap import autoregression
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.signatures import derivatives
 from fingervision.diagnosis.input.observations import Observations
@@ -139,7 +139,7 @@ def settled_with_records(
     alone = _with_picture_noise(data, problem, explanation, errors_mm)
     best, found = settled(alone, fit(alone, explanation.names, explanation.values, iterations=MANY_STEPS), rng)
     # A residual above the assumed noise widens the intervals (Birge 1932).
-    rows = max(1, int(problem.measured.size - problem.whitener.aside.sum()) - best.free)
+    rows = max(1, problem.rows - best.free)
     best = replace(best, covariance=best.covariance * max(1.0, best.score / rows))
     best = with_record_errors(alone, best, errors_mm, assumed_mm=_assumed(alone, rng))
     residual = problem.measured - problem.whitened(best.values)
@@ -233,12 +233,19 @@ def _assumed(problem: Problem, rng: np.random.Generator) -> list[Array]:
     whitener, history = problem.whitener, problem.chain.history
     stays, out = float(np.exp(-2.0 / max(whitener.input_samples, 0.04))), list[Array]()
     for _ in range(ASSUMED):
-        held = [autoregression(stays, run.stop - run.start, rng) for run in history.runs]
+        held = [_autoregression(stays, run.stop - run.start, rng) for run in history.runs]
         passing = whitener.passing_mm * rng.standard_normal(history.input_mm.size)
         drawn = np.zeros(problem.measured.size)
         drawn[: history.input_mm.size] = passing + whitener.input_mm * np.concatenate(held)
         out.append(drawn)
     return out
+
+
+def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
+    """First-order autoregression of unit variance; shape (count,)."""
+    start = phi * rng.standard_normal(1)
+    shocks = np.sqrt(1.0 - phi**2) * rng.standard_normal(count)
+    return np.asarray(lfilter([1.0], [1.0, -phi], shocks, zi=start)[0], dtype=np.float64)
 
 
 def simulated_errors(data: Observations, rng: np.random.Generator) -> Iterator[Array]:

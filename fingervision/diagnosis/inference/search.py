@@ -1,4 +1,4 @@
-"""Search over single effects, pairs and triples against the null bootstrap, and again with a better noise."""
+"""Search over single effects, pairs and triples, and again with a better noise."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -6,12 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from fingervision.diagnosis.inference.ambiguity_set import ambiguity_set, beside_foretold, choices, odds
+from fingervision.diagnosis.inference.ambiguity_set import ambiguity_set, beside_foretold
+from fingervision.diagnosis.inference.evidence import choices, detection_limits, follows_the_input, odds, speaks_for
 from fingervision.diagnosis.inference.explanation_candidates import (
     LEAST_GAIN,
     Progress,
-    added_share,
-    beyond_the_input,
     different,
     extended,
     likeliest,
@@ -19,23 +18,17 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     simplest,
     single_effects,
     swapped,
-    within_a_step,
-    without_roundings,
 )
-from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.model_adequacy import VERY_STRONG, imitated, remaining_structure
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
-from fingervision.diagnosis.inference.search_state import ROUGH, Findings, SearchState, completes, noise_known
-from fingervision.diagnosis.inference.significance import Evidence, detection_limits
+from fingervision.diagnosis.inference.search_state import ROUGH, Findings, SearchState, beyond_form, noise_known
 from fingervision.diagnosis.inference.verdict import STANDING_SHARE
-from fingervision.diagnosis.input.observations import PATH, Observations
+from fingervision.diagnosis.input.observations import FORM, Observations
 from fingervision.domain.effect import Flags
 
-TRIPLE_SHARE = 0.15
-"""Least share of the whole change of the prediction that a third effect must contribute (`added_share`): three effects
-can fit almost anything."""
 PAIRS_REFITTED = 60
 """Number of pairs that are refitted jointly, in the order of their signatures' gain: 27 effects have 351 pairs."""
 PART_OF_UNKNOWN = 9.0
@@ -54,7 +47,6 @@ BASES = 14
 
 def search(
     problem_beside: Callable[[Explanation | None], Problem],
-    rng: np.random.Generator,
     forced: frozenset[str],
     progress: Progress,
     known: Explanation | None = None,
@@ -68,8 +60,6 @@ def search(
     ----------
     problem_beside : callable
         Returns the estimation problem with the noise estimated from the residual of a given explanation.
-    rng : numpy Generator
-        Generator for the null bootstrap.
     forced : frozenset of str
         Effects that the user requires.
     progress : callable
@@ -77,33 +67,32 @@ def search(
     known : Explanation or None
         Explanation found by an earlier search of the same measurement, from whose residual the noise is estimated.
     """
-    state = _one_effect(replace(noise_known(problem_beside, known), known=known), rng, forced)
+    state = _one_effect(replace(noise_known(problem_beside, known), known=known), forced)
     progress(0.3)
     state = _two_effects(state, lambda share: progress(0.3 + 0.4 * share))
     state = _three_effects(state, lambda share: progress(0.7 + 0.1 * share))
-    state = _insisted(state, forced) if forced else _without_imitations(_beyond_roundings(state))
+    state = _insisted(state, forced) if forced else _without_imitations(state)
     progress(0.82)
-    state = _gated(state, rng)
+    state = _gated(state)
     progress(0.9)
     return _findings(state, forced)
 
 
-def _one_effect(state: SearchState, rng: np.random.Generator, forced: frozenset[str]) -> SearchState:
+def _one_effect(state: SearchState, forced: frozenset[str]) -> SearchState:
     """Fit every effect alone; keep the simplest effect that fits as well as the best, if its gain is significant."""
     problem = state.problem
     alone = state.with_known(single_effects(problem, state.atoms, 20), 1)
-    singles = [e for e in alone if not within_a_step(problem, e)]
-    evidence = Evidence.of(state.problem, state.atoms, state.nothing, rng)
-    state = replace(state, singles=singles, evidence=evidence)
+    singles = [e for e in alone if not follows_the_input(problem, e, state.nothing)]
+    state = replace(state, singles=singles)
     if not singles:
         return state
     stalled = [e for e in singles if set(e.names) & state.problem.stalled]
     if stalled and stalled[0].score < state.nothing.score:
         near = [e for e in stalled if e.score - stalled[0].score < LEAST_GAIN]
-        return replace(state, best=simplest(near, state.values, state.nothing), peers=singles)
-    if not (state.speaks_for(singles, state.nothing) or forced):
+        return replace(state, best=simplest(near, state.nothing), peers=singles)
+    if not (speaks_for(problem, singles, state.nothing) or forced):
         return state
-    return replace(state, best=simplest(singles[:LIKELIEST], state.values, state.nothing), peers=singles)
+    return replace(state, best=simplest(singles[:LIKELIEST], state.nothing), peers=singles)
 
 
 def _two_effects(state: SearchState, progress: Progress) -> SearchState:
@@ -116,44 +105,18 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
         in_time = {e.names: e for e in pairs_in_time(problem, state.atoms, singles)}
         pairs = [min(e, in_time.pop(e.names, e), key=lambda one: one.score) for e in pairs]
         pairs = sorted([*pairs, *in_time.values()], key=lambda one: one.score)
-    pairs = [e for e in swapped(problem, state.atoms, pairs) if not within_a_step(problem, e)]
+    pairs = [e for e in swapped(problem, state.atoms, pairs) if not follows_the_input(problem, e, singles[0])]
     state = replace(state, pairs=pairs)
     # Pairs are compared with the best single effect: compared with a simpler formula, a second effect would gain what a
     # richer formula has already gained.
-    shown = _beside_roundings(state, pairs)
-    if not shown:
-        return state
-    large = added_share(problem, singles[0], shown[0]) > SMALL_SHARE
-    if (large or any(completes(state, singles[0], pair) for pair in shown[:LIKELIEST])) and state.speaks_for(
-        shown, singles[0]
-    ):
-        return replace(state, best=likeliest(shown[:LIKELIEST], state.values), peers=shown)
-    return state
+    clear = [e for e in pairs[:LIKELIEST] if beyond_form(state, singles[0], e)]
+    return replace(state, best=likeliest(clear), peers=pairs) if speaks_for(problem, clear, singles[0]) else state
 
 
 def _leaves_structure(state: SearchState, explanation: Explanation) -> bool:
     """Whether an explanation leaves more than a share of the disagreement that would be named, in chi-square."""
-    rows = state.values - int(state.problem.whitener.aside.sum())
+    rows = state.problem.rows
     return explanation.score - rows > STANDING_SHARE**2 * max(0.0, state.nothing.score - rows)
-
-
-def _beside_roundings(state: SearchState, pairs: list[Explanation]) -> list[Explanation]:
-    """Keep pairs of effects that change the prediction by more than the recorded input's error.
-
-    If the best pair changes the prediction by less than the input's error, its effects only follow the rounding errors
-    of an encoder. Another pair may follow the same rounding errors with a larger amplitude, and is kept only if its
-    effects gain significantly when they are added to the best pair.
-    """
-    shown = beyond_the_input(state.problem, state.singles[0], pairs)
-    if not shown or shown[0] is pairs[0]:
-        return shown
-    base, kept = pairs[0], list[Explanation]()
-    for pair in shown[:LIKELIEST]:
-        more = {name: pair.values[name] for name in pair.names if name not in base.names}
-        together = fit(state.problem, (*base.names, *more), {**base.values, **more})
-        if more and state.speaks_for([together], base):
-            kept.append(pair)
-    return kept
 
 
 def _three_effects(state: SearchState, progress: Progress) -> SearchState:
@@ -162,37 +125,18 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
         return state
     problem, pairs = state.problem, state.pairs
     bases = different(problem, pairs, PAIRS_EXTENDED)
-    asked = None if state.evidence is None else state.evidence.thresholds
-    tried = extended(problem, state.atoms, bases, TRIPLES_REFITTED, progress, scanned=ROUGH, asked=asked)
-    triples = [e for e in state.with_known(tried, 3) if not within_a_step(problem, e)]
+    tried = extended(problem, state.atoms, bases, TRIPLES_REFITTED, progress, scanned=ROUGH)
+    triples = [e for e in state.with_known(tried, 3) if not follows_the_input(problem, e, state.best)]
     state = replace(state, triples=triples)
-    if not triples:
-        return state
-    share = added_share(problem, state.best, triples[0])
-    if share == 0.0:
-        # The best third effect only follows the rounding of the input, and so may all other ones.
-        return state
-    large = share > TRIPLE_SHARE
-    if not (large or completes(state, state.best, triples[0])) or not state.speaks_for(triples, state.best):
+    clear = [e for e in triples[:LIKELIEST] if beyond_form(state, state.best, e)]
+    if not speaks_for(problem, clear, state.best):
         return state
     imitation = imitated(problem, state.shapes, triples[0], [state.nothing, *state.singles[:BASES], *pairs[:3]])
     if imitation is not None:
-        # If the third effect changes little, the structure that it imitates remains in the residual, and the probes
-        # will report it.
-        return replace(state, imitation=imitation) if large else state
-    triples.sort(key=lambda e: e.bic(state.values))
-    again = [e for e in swapped(problem, state.atoms, triples) if not within_a_step(problem, e)]
-    triples = beyond_the_input(problem, state.best, again) or triples
-    return replace(state, triples=triples, best=likeliest(triples[:LIKELIEST], state.values), peers=triples)
-
-
-def _beyond_roundings(state: SearchState) -> SearchState:
-    """Drop effects that only follow errors of the recorded input; compare the result with other explanations."""
-    best = without_roundings(state.problem, state.best)
-    if best is state.best:
-        return state
-    pairs = beyond_the_input(state.problem, state.singles[0], state.pairs)
-    return replace(state, best=best, peers=[best, *(pairs if len(best.names) > 1 else state.singles)])
+        return replace(state, imitation=imitation)
+    triples.sort(key=lambda e: e.bic)
+    triples = swapped(problem, state.atoms, triples)
+    return replace(state, triples=triples, best=likeliest(triples[:LIKELIEST]), peers=triples)
 
 
 def _without_imitations(state: SearchState) -> SearchState:
@@ -205,9 +149,9 @@ def _without_imitations(state: SearchState) -> SearchState:
     return state if imitation is None else replace(state, imitation=imitation, unknown=imitation)
 
 
-def _gated(state: SearchState, rng: np.random.Generator) -> SearchState:
+def _gated(state: SearchState) -> SearchState:
     """Test the residual of the best explanation with generic probes."""
-    unknown, left_over = remaining_structure(state.problem, state.shapes, state.best, rng)
+    unknown, left_over = remaining_structure(state.problem, state.shapes, state.best)
     # Structure that is small compared with the explained change is reported as remaining, whether probes or a third
     # effect found it.
     if unknown is None and left_over is None:
@@ -222,25 +166,22 @@ def _findings(state: SearchState, forced: frozenset[str]) -> Findings:
     if best.names:
         alternatives, distances = _indistinguishable(state) if not forced else _with_required(state, forced)
     alternatives = beside_foretold(problem, alternatives)
-    best = min(alternatives, key=lambda e: odds(problem, e, state.values)) if best.names else best
+    best = min(alternatives, key=lambda e: odds(problem, e)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
     if state.unknown is not None:
-        stands = max(0.0, best.score - state.values)
+        stands = max(0.0, best.score - problem.rows)
         if nothing.score - best.score < PART_OF_UNKNOWN * stands and not forced & set(best.names):
             best = nothing
         alternatives = [best] if best.names else []
-    smallest = (
-        {} if state.evidence is None else detection_limits(problem, state.atoms, nothing, state.evidence.thresholds)
-    )
     return Findings(
         best=best,
         alternatives=tuple(alternatives),
         nothing=nothing,
         singles=tuple(state.singles),
-        nearest=likeliest([nothing, *state.singles[:1], *state.pairs[:LIKELIEST]], state.values),
+        nearest=likeliest([nothing, *state.singles[:1], *state.pairs[:LIKELIEST]]),
         unknown=state.unknown,
         left_over=state.left_over,
-        smallest=smallest,
+        smallest=detection_limits(problem, state.atoms, nothing),
         distances=distances,
         problem=problem,
     )
@@ -265,7 +206,7 @@ def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     begins = [required | dict(base.values) for base in bases]
     together = [fit(problem, tuple(begin), begin, iterations=20) for begin in begins]
     peers = [*holding, *together]
-    return replace(state, best=likeliest(peers, state.values), peers=peers, imitation=None)
+    return replace(state, best=likeliest(peers), peers=peers, imitation=None)
 
 
 def _indistinguishable(state: SearchState) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
@@ -298,13 +239,13 @@ def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     values, free = explanation.values, explanation.free
     residual_mm = data.stacked_mm - data.chain.stacked(values)
     problem = data.problem(residual_mm, free, explained=True, values=values)
-    columns_mm = data.path_errors_mm(values)
-    if not columns_mm.shape[1]:
+    columns_mm = np.hstack([data.path_errors_mm(values), data.form_errors_mm(values)])
+    if not columns_mm.any():
         return problem
-    # What the errors of the path explain is no noise of the picture.
+    # What the errors of path and formulas explain is no noise of the picture.
     left = problem.measured - problem.whitened(values)
     beside = replace(explanation, residual=left, sigma_mm=problem.offsets.spread(left)[0])
-    errors, _ = estimated_coefficients(problem, beside, columns_mm.shape[1], data.behind(PATH))
+    errors, _ = estimated_coefficients(problem, beside, columns_mm.shape[1], data.behind(FORM))
     return data.problem(residual_mm - columns_mm @ errors, free, explained=True, values=values)
 
 
@@ -327,7 +268,7 @@ class Look:
 
     def again(self, data: Observations, known: Explanation | None = None) -> Searched:
         """Search once more, with the noise estimated from the residual of the effects found so far."""
-        look = partial(search, partial(problem_of, data), self.rng, self.forced, self.progress)
+        look = partial(search, partial(problem_of, data), self.forced, self.progress)
         found = look(known)
         if _fits_far_better(data, found):
             found = look(found.nearest)
@@ -348,7 +289,7 @@ def _fits_far_better(data: Observations, found: Findings) -> bool:
     deviations in 60 rows beside an offset gained only 65 in chi-square over a drift.
     """
     nearest, best, problem = found.nearest, found.best, found.problem
-    if not nearest.names or nearest.names == best.names or nearest.bic(problem.measured.size) > best.score:
+    if not nearest.names or nearest.names == best.names or nearest.bic > best.score:
         return False
     if data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels))) is not None:
         return False
@@ -362,7 +303,7 @@ def _likelihood_cost(data: Observations, explanation: Explanation) -> tuple[floa
     problem, names = problem_of(data, explanation), explanation.names
     again = fit(problem, names, explanation.values, iterations=MANY_STEPS) if names else problem.nothing()
     _, determinant = problem.whitener.columns(problem.measured[:, None])
-    return again.bic(problem.measured.size) + determinant, problem.whitener.aside
+    return again.bic + determinant, problem.whitener.aside
 
 
 def _noise_is_too_large(found: Findings) -> bool:
@@ -371,7 +312,7 @@ def _noise_is_too_large(found: Findings) -> bool:
     The noise is estimated from the residual of a rough first fit. If the first fit is poor, its errors count as
     correlated noise, and a second effect cannot be found because the assumed noise is too large.
     """
-    rows = int(found.problem.measured.size - found.problem.whitener.aside.sum())
+    rows = found.problem.rows
     return bool(found.best.score < rows - QUIET * rows**0.5)
 
 

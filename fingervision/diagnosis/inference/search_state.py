@@ -12,11 +12,7 @@ from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.model_adequacy import shapes_of
 from fingervision.diagnosis.inference.probe_basis import Probes
 from fingervision.diagnosis.inference.signatures import Signatures, signatures
-from fingervision.diagnosis.inference.significance import Evidence
 
-COMPLETE = 0.05
-"""Largest remaining share, in chi-square beyond the noise, of a complete explanation: effects that only fit the
-inexactness of another effect's formula reduce it by less."""
 NOISY = 2.0 * 2.0**0.5
 """Excess of the chi-square of noise over the number of rows n that occurs now and then, in units of sqrt(n): two
 standard deviations sqrt(2 n)."""
@@ -52,24 +48,21 @@ class Findings:
         return replace(self, best=best, alternatives=others, problem=problem or self.problem)
 
 
-def completes(state: "SearchState", smaller: Explanation, larger: Explanation) -> bool:
-    """Whether the larger explanation removes nearly all of the residual of the smaller one, as a true explanation does.
+def beyond_form(state: "SearchState", smaller: Explanation, larger: Explanation) -> bool:
+    """Whether a larger explanation gains more than the inexact formulas of the smaller one leave to anything else.
 
-    The residual of the smaller explanation must clearly exceed the noise and the inexactness of its formula. An effect
-    that is added to the smaller explanation fits part of the inexactness of its formula, however large the residual is.
-    If the larger explanation does not contain the effects of the smaller one, and leaves only noise, no more than the
-    typical inexactness of formulas is allowed for the smaller explanation. For example, a creep whose residual was 70
-    times the noise (3.6 % of the explained change) imitated a ratio and an offset, which together leave only noise.
+    The shares of all formulas of the smaller explanation add up. If the larger explanation does not contain the effects
+    of the smaller one, and leaves only noise, no more than the typical inexactness of formulas is allowed for the
+    smaller explanation. For example, a creep whose residual was 70 times the noise (3.6 % of the explained change)
+    imitated a ratio and an offset, which together leave only noise.
     """
-    rows = state.values - int(state.problem.whitener.aside.sum())
-    stands = smaller.score - rows
-    joins = set(smaller.names) <= set(larger.names)
-    noise_alone = not joins and larger.score - rows < NOISY * rows**0.5
-    share = state.problem.form_share if joins else FORM_SHARE if noise_alone else SMALL_SHARE
-    # Where three effects leave noise alone, any clear excess over it in the pair that they replace is structure.
-    visible = NOISY * rows**0.5 if noise_alone and len(larger.names) > 2 else float(rows)
-    plain = max(visible, share**2 * (state.nothing.score - smaller.score))
-    return stands > plain and (noise_alone or larger.score - rows < COMPLETE * stands)
+    rows = state.problem.rows
+    joins, noise_alone = set(smaller.names) <= set(larger.names), larger.score - rows < NOISY * rows**0.5
+    share = len(smaller.names) * (FORM_SHARE if noise_alone and not joins else SMALL_SHARE)
+    # What the runs' offsets explain beside the larger explanation, they explain in all of them.
+    metric = state.problem.offsets.metric(larger.sigma_mm)
+    without, left, rest = (state.problem.offsets.squared(e.residual, metric) for e in (state.nothing, smaller, larger))
+    return left - rest > share**2 * (without - left)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,8 +81,6 @@ class SearchState:
         Generic shapes that are not in the catalogue.
     singles, pairs, triples : list of Explanation
         All explanations with one effect, and the most probable ones with two and three, best first.
-    evidence : Evidence or None
-        Criterion for the significance of gains.
     known : Explanation or None
         Explanation found by an earlier search of the same measurement.
     imitation, unknown, left_over : str or None
@@ -106,16 +97,10 @@ class SearchState:
     singles: list[Explanation] = field(default_factory=list)
     pairs: list[Explanation] = field(default_factory=list)
     triples: list[Explanation] = field(default_factory=list)
-    evidence: Evidence | None = None
     known: Explanation | None = None
     imitation: str | None = None
     unknown: str | None = None
     left_over: str | None = None
-
-    @property
-    def values(self) -> int:
-        """Number of measured values, at least 2."""
-        return max(2, int(self.problem.measured.size))
 
     def with_known(self, found: list[Explanation], count: int) -> list[Explanation]:
         """Add the explanation of an earlier search, refitted with the present noise, if it has `count` effects.
@@ -132,10 +117,6 @@ class SearchState:
         kept = rest if any(e.names == again.names for e in rest) else [*rest, again]
         return sorted(kept, key=lambda explanation: explanation.score)
 
-    def speaks_for(self, found: list[Explanation], base: Explanation) -> bool:
-        """Whether the best of some explanations gains more over `base` than noise alone would."""
-        return self.evidence is not None and self.evidence.speaks_for(found, base)
-
 
 def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> SearchState:
     """Estimate the noise from the residual of the known effects, or of effects from a rough first search."""
@@ -151,7 +132,7 @@ def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: 
     pairs = extended(problem, atoms, rough[:3], 16, lambda _: None, scanned=1, refined=ROUGH) if many else []
     first = [*rough[:1], *pairs[:1]]
     if first:
-        problem = problem_beside(min(first, key=lambda e: e.bic(problem.measured.size)))
+        problem = problem_beside(min(first, key=lambda e: e.bic))
         atoms = signatures(problem)
     nothing = problem.nothing()
     return SearchState(problem, atoms, nothing, nothing, [nothing], shapes_of(problem))

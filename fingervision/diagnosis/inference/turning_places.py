@@ -95,7 +95,7 @@ def _likelier(data: Observations, found: Findings) -> Turned | None:
     def cost(each: Turned) -> float:
         problem = replace(judge, chain=each.data.chain)
         fitted = fit(problem, each.explanation.names, each.explanation.values, iterations=20)
-        return fitted.bic(problem.measured.size) + each.price
+        return fitted.bic + each.price
 
     costs = [cost(each) for each in tried]
     now = costs[0] if found.best.names else judge.nothing().score + data.turns.price

@@ -9,8 +9,9 @@ from fingervision.diagnosis.inference.held_out_prediction import rms_mm
 from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.position_map import NAME
+from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
-from fingervision.diagnosis.input.observations import FORM_SHARE_OF_RIGS, Observations
+from fingervision.diagnosis.input.observations import FORM, FORM_SHARE_OF_RIGS, Observations
 from fingervision.diagnosis.noise.channel_noises import most_noise
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.domain.effect import Array, Flags
@@ -240,12 +241,19 @@ def _without_scatter(values: Array, runs: tuple[slice, ...]) -> Array:
 def standing_of(data: Observations, found: Findings) -> Standing:
     """Unexplained fraction after a search, with a map of position errors subtracted to first order."""
     before = data.stacked_mm - data.chain.stacked({})
-    left = before if not found.best.names else data.stacked_mm - data.chain.stacked(found.best.values)
+    left = data.stacked_mm - data.chain.stacked(found.best.values) - form_error_mm(data, found)
     if data.position_map is not None:
         left = left - data.position_map.refitted(found.problem, found.best, data.behind(data.position_map)).fitted_mm
     if data.run_gains is not None:
         data = replace(data, run_gains=data.run_gains.refitted(found.problem, found.best, data.behind(data.run_gains)))
     return standing(data, found.problem, before, left)
+
+
+def form_error_mm(data: Observations, found: Findings) -> Array:
+    """Estimated error of the formulas of the best explanation, as far as its kind is known; shape (m,) (mm)."""
+    columns_mm = data.form_errors_mm(found.best.values)
+    sizes, _ = estimated_coefficients(found.problem, found.best, columns_mm.shape[1], data.behind(FORM))
+    return np.asarray(columns_mm @ sizes, dtype=np.float64)
 
 
 def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict, str | None]:
@@ -318,7 +326,7 @@ def judged(data: Observations, found: Findings) -> Answer:
         Findings of the search.
     """
     before = data.stacked_mm - data.chain.stacked({})
-    after = data.stacked_mm - data.chain.stacked(_values(data, found))
+    after = data.stacked_mm - data.chain.stacked(_values(data, found)) - form_error_mm(data, found)
     stands = standing(data, found.problem, before, after)
     digit = resolution(data.table.gap_mm) if data.recorded.commanded else 0.0
     n, edges = data.chain.history.input_mm.size, data.chain.history.both_edges

@@ -82,6 +82,8 @@ SHORT = 100
 """Number of samples below which no row is excluded before an effect is found."""
 PATH = "path"
 """Name of the random effect of the errors of the path (`Observations.path_errors_mm`)."""
+FORM = "form"
+"""Name of the random effect of the errors of formulas (`Observations.form_errors_mm`)."""
 NOTHING: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 """The model without effects."""
 SMALL_TURN = 0.02
@@ -170,7 +172,7 @@ class Observations:
         """Random effects beside an explanation, each with its columns, in the order used by a problem."""
         own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains, self.roundings) if one]
         drawing = [("drawing", self.refit.columns)] if self.refit.moved else []
-        return (*own, (PATH, self.path_errors_mm(values)), *drawing)
+        return (*own, (PATH, self.path_errors_mm(values)), (FORM, self.form_errors_mm(values)), *drawing)
 
     def path_errors_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Change of the prediction per standard uncertainty of reversals, turning points and clock; shape (m, k)."""
@@ -180,6 +182,14 @@ class Observations:
         if self.turns.random:
             parts.append(self.turn_columns_mm(values) * self.turns.sigmas)
         return np.hstack(parts)
+
+    def form_errors_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
+        """Change of the prediction per standard deviation of each error of an inexact formula; shape (m, k)."""
+        predicted_mm, moved_mm = self.chain.stacked(values), list[Array]()
+        for name, effect in self.effects.items():
+            for other in effect.inexact(values.get(name, {})) if effect.inexact is not None else ():
+                moved_mm.append(self.chain.stacked({**values, name: other}) if name in values else predicted_mm)
+        return np.stack([predicted_mm, *moved_mm], axis=1)[:, 1:] - predicted_mm[:, None]
 
     def behind(self, effect: object) -> int:
         """Number of columns that follow the columns of a given random effect in the problem."""
@@ -200,7 +210,7 @@ class Observations:
         for nuisance in (self.position_map, self.run_gains, self.roundings):
             residual_mm = residual_mm if nuisance is None else residual_mm - nuisance.fitted_mm
         parts = np.split(residual_mm, len(self.channels))
-        aside = self.outliers(parts, explained=explained)
+        aside = self.outliers(parts, explained=explained, values=values)
         repeated = self.measured_pure_errors(aside)
         parts[0] = self.without_stamps(parts[0])
         noises = (
@@ -210,13 +220,19 @@ class Observations:
         )
         return self.judged_by(noises, aside, values, known=repeated is not None)
 
-    def outliers(self, parts: list[Array], *, explained: bool) -> list[Flags]:
+    def outliers(
+        self, parts: list[Array], *, explained: bool, values: Mapping[str, Mapping[str, float]] = NOTHING
+    ) -> list[Flags]:
         """Mark the rows of each channel's residual that are gross errors, each of shape (n,)."""
+        changes = np.split(self.chain.stacked(values) - self.chain.stacked({}), len(parts))
         history = self.chain.history
         timed = history.time_s is not None
         short = timed and history.input_mm.size < SHORT
         sigmas = OUTLIER_SIGMAS if explained else None if short else RAW_SIGMAS
-        return [gate(part, history.input_mm, history.runs, timed, sigmas) | self.distrusted for part in parts]
+        return [
+            gate(part, history.input_mm, history.runs, timed, sigmas, change) | self.distrusted
+            for part, change in zip(parts, changes, strict=True)
+        ]
 
     def judged_by(
         self,

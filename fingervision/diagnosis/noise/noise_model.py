@@ -49,12 +49,20 @@ CROWDED = 4
 whereas outliers are single or in pairs."""
 
 
-def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: bool, sigmas: float | None) -> Flags:
+def gate(
+    residual: Array,
+    input_mm: Array,
+    runs: tuple[slice, ...],
+    ordered: bool,
+    sigmas: float | None,
+    change_mm: Array | None = None,
+) -> Flags:
     """Mark outliers against a running median; shape (n,), True where a value is to be excluded.
 
     Without times the rows have no order, and the median of all values replaces the running median. `sigmas` is the
     limit of an outlier in standard deviations. If `sigmas` is None, no value is excluded, because in a short record an
-    effect that acts on a few samples looks like outliers until it is explained.
+    effect that acts on a few samples looks like outliers until it is explained. `change_mm`, shape (n,), is what the
+    effects found so far change: a row too early or too late at their jumps is an error of theirs.
     """
     out = np.zeros(residual.size, dtype=bool)
     if sigmas is None:
@@ -75,7 +83,7 @@ def gate(residual: Array, input_mm: Array, runs: tuple[slice, ...], ordered: boo
     if sigma > 0.0:
         out = np.abs(rest) > sigmas * sigma
         if ordered:
-            there = _recurring(out, [*_places(input_mm), *_after_steps(input_mm, runs)])
+            there = _recurring(out, [*_places(input_mm), *_after_steps(input_mm, runs), _at_jumps(change_mm)])
             for i in 2 + np.flatnonzero(np.convolve(out, np.ones(5))[4:-4] >= CROWDED):
                 if out[i - 2 : i + 3].sum() >= CROWDED:
                     out[i - 2 : i + 3] = False
@@ -106,6 +114,13 @@ def _after_steps(input_mm: Array, runs: tuple[slice, ...]) -> list[NDArray[np.in
         return []
     last = np.repeat([run.stop for run in runs], [run.stop - run.start for run in runs])
     return [steps[steps + lag < last[steps]] + lag for lag in range(AFTER_A_STEP)]
+
+
+def _at_jumps(change_mm: Array | None) -> NDArray[np.intp]:
+    """Samples before and after the largest changes from sample to sample."""
+    moved = np.abs(np.diff(np.zeros(1) if change_mm is None else change_mm))
+    before = np.flatnonzero(moved > 0.5 * np.max(moved, initial=0.0))
+    return np.unique([before, before + 1])
 
 
 def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) -> Noise:
