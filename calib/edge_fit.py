@@ -95,7 +95,7 @@ class EdgeFit:
 
     def outline_px(self, side: Floats, is_outer: Bools) -> Floats:
         """Distance of the outline of the whole part beyond each edge: the width of a side wall."""
-        if self.scene.name != "wall":
+        if not self.scene.has_wall:
             return np.zeros(side.size)
         distances, _ = self.scene.steps(self.beside[None], side, is_outer)
         return np.asarray(distances[0].max(axis=-1))

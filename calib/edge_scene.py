@@ -56,6 +56,11 @@ class Scene:
     probability: float
     u_form: float = 0.0
 
+    @property
+    def has_wall(self) -> bool:
+        """Whether there is a side wall, which is no part of the finger's face and is not seen at its tip."""
+        return "wall" in self.name
+
 
 def _nothing(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
     shape = (len(p), side.size, 1)
@@ -155,6 +160,39 @@ SCENES = (
     Scene("shadow", _shadow(_QUANTILES), *_SHADOW, 0.045, 0.1),
     Scene("shadow", _shadow(-np.log1p(-_QUANTILES)), *_SHADOW, 0.045, 0.1),
     Scene("shadow", _shadow(_QUANTILES, is_apart=True), *_SHADOW_APART, 0.01, 0.1),
+)
+
+
+def pair(first: Scene, second: Scene) -> Scene:
+    """Two things beside the edges at once: what each adds to the finger's own step adds up."""
+    count = len(first.mean)
+
+    def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+        (at, weight), (other_at, other_weight) = (
+            first.steps(p[:, :count], side, is_outer),
+            second.steps(p[:, count:], side, is_outer),
+        )
+        own = np.zeros((*at.shape[:-1], 1))
+        return np.concatenate([at, other_at, own], -1), np.concatenate([weight, other_weight, own - 1.0], -1)
+
+    name = " and ".join(sorted((first.name, second.name)))
+    chance = first.probability * second.probability / NOTHING.probability
+    u_form = float(np.hypot(first.u_form, second.u_form))
+    starts = tuple(
+        (own + other, inner + other_inner, outer + other_outer)
+        for own, inner, outer in first.starts
+        for other, other_inner, other_outer in second.starts
+    )
+    return Scene(name, steps, first.mean + second.mean, first.u + second.u, starts, chance, u_form)
+
+
+# Pairs that are tried where one alone does not explain the edges.
+_INNER, _LINE_ALONE, _BAND_ALONE, _RAMP = SCENES[0], SCENES[3], SCENES[4], SCENES[5]
+PAIRS = (
+    pair(_INNER, _LINE_ALONE),
+    pair(_INNER, _BAND_ALONE),
+    pair(_INNER, _RAMP),
+    pair(_LINE_ALONE, _RAMP),
 )
 
 # Distances of the steps that the score test tries, at the inner edges and at all of them.

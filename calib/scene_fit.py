@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from calib.edge_fit import START_WIDENED, EdgeData, EdgeFit, derivatives, edge_width, fitted, priors
 from calib.edge_profile import EdgeProfile
-from calib.edge_scene import NOTHING, PROBE, SCENES
+from calib.edge_scene import NOTHING, PAIRS, PROBE, SCENES, Scene
 from calib.tone_curves import Family
 
 Floats = NDArray[np.float64]
@@ -20,6 +20,8 @@ HOPELESS = 20.0
 # Difference of the blurs of inner and outer edges (ln sigma) above which a wall narrower than the blur is possible: it
 # is four times the precision of recordings without a wall.
 WIDER_INSIDE = 0.02
+# Mean chi-square of a bin above which two things at once are tried.
+LEAVES_MORE = 1.1
 # Rate of false alarms of the score test, and least information of a direction as a share of the largest.
 FALSE_ALARMS, LEAST_TOLD = 1e-3, 1e-3
 
@@ -48,23 +50,35 @@ def fit_scenes(
     narrowest = min(edge_width(profile) for profile in profiles)
     fits = [fitted(family, data, data.start()) for family in families]
     for scene in SCENES:
-        begun = []
-        for own, inner_px, outer_px in scene.starts:
-            start = data.start()
-            start[0] = np.log(narrowest / START_WIDENED)
-            start[data.own_places()[:, 0]] = np.where(data.is_outer, outer_px, inner_px)
-            begin = np.array(families[0].mean), np.array(own)
-            begun.append(fitted(families[0], coarse, start, scene, begin, FIRST_STEPS))
-        best = max(begun, key=lambda fit: fit.log_evidence)
-        for family in families:
-            parameters = best.parameters if family is families[0] else np.array(family.mean)
-            best = fitted(family, data, best.edges, scene, (parameters, best.beside))
-            fits.append(best)
+        fits += _fits(scene, families, data, coarse, narrowest)
+    if float(np.mean(max(fits, key=lambda fit: fit.log_evidence).misfit)) > LEAVES_MORE:
+        for scene in PAIRS:
+            fits += _fits(scene, families[:1], data, coarse, narrowest)
     least = max(fit.log_evidence for fit in fits) - HOPELESS
     begun = [fit for fit in fits if fit.family is families[0] and (fit.scene is NOTHING or fit.log_evidence > least)]
     for fit in begun:
         fits += [fitted(each, data, fit.edges, fit.scene, (np.array(each.mean), fit.beside)) for each in others]
     return sorted(fits, key=lambda fit: -fit.log_evidence)
+
+
+def _fits(
+    scene: Scene, families: Sequence[Family], data: EdgeData, coarse: EdgeData, narrowest_px: float
+) -> list[EdgeFit]:
+    """Fits of one scene with each family, from the best of its starts."""
+    begun = []
+    for own, inner_px, outer_px in scene.starts:
+        start = data.start()
+        start[0] = np.log(narrowest_px / START_WIDENED)
+        start[data.own_places()[:, 0]] = np.where(data.is_outer, outer_px, inner_px)
+        begin = np.array(families[0].mean), np.array(own)
+        begun.append(fitted(families[0], coarse, start, scene, begin, FIRST_STEPS))
+    best = max(begun, key=lambda fit: fit.log_evidence)
+    found = []
+    for family in families:
+        parameters = best.parameters if family is families[0] else np.array(family.mean)
+        best = fitted(family, data, best.edges, scene, (parameters, best.beside))
+        found.append(best)
+    return found
 
 
 def is_more_beside(profiles: Sequence[EdgeProfile], model_error: float, family: Family) -> bool:

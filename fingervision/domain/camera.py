@@ -162,7 +162,8 @@ class BesideEdges:
     Parameters
     ----------
     name : str
-        The most probable cause: wall, glare or shadow.
+        The most probable cause: wall, glare or shadow, or two of them joined by "and"; empty if nothing is taken off,
+        but something beside the edges with another tone curve explains them as well.
     probability : float
         Its probability.
     inner_px, outer_px : (float, float)

@@ -18,7 +18,7 @@ from fingervision.vision.defect_pixels import blanked, defect_pixels
 from fingervision.vision.flank_profiles import Seen
 from fingervision.vision.grey import to_grey, top_level
 from fingervision.vision.learnt_camera import MODEL_ERROR, learnt_camera
-from fingervision.vision.learnt_scene import learnt_beside
+from fingervision.vision.learnt_scene import learnt_beside, less_sure
 from fingervision.vision.pipeline import Settings, look_closely, region_of_interest
 
 # Number of frames with a gap from which the camera is learnt: five show all sub-pixel positions of slightly tilted
@@ -127,7 +127,8 @@ def camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) 
         again = replace(settings, camera=camera)
         seen = [look[0] for frame, _ in looks if (look := _steps_alone(frame, again)) is not None]
         beside = learnt_beside(seen, camera.response.curve, top, coding, MODEL_ERROR[coding])
-        camera = replace(camera, beside=beside)
+        rivals_px = camera.beside.u_gap_px if camera.beside is not None and not camera.beside.name else 0.0
+        camera = replace(camera, beside=less_sure(beside, rivals_px))
     return camera
 
 

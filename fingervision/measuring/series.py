@@ -201,7 +201,7 @@ def _beside(outcome: object) -> list[str]:
     """Names of the disturbances found at the edges of a measurement."""
     if not isinstance(outcome, GapMeasurement):
         return []
-    seen = [outcome.beside] if outcome.beside else []
+    seen = outcome.beside.split(" and ") if outcome.beside else []
     if outcome.roughness_px:
         seen.append("roughness")
     if outcome.fields_apart_px > COMB_PX:

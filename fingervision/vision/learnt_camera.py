@@ -22,7 +22,16 @@ from fingervision.domain.camera import (
 )
 from fingervision.domain.frame import Coding
 from fingervision.vision.flank_profiles import Seen, unclipped_profiles
-from fingervision.vision.learnt_scene import BESIDE_PX, DISCREPANCY, SURE, beside_edges, can_tell_beside, with_structure
+from fingervision.vision.learnt_scene import (
+    BESIDE_PX,
+    DISCREPANCY,
+    SURE,
+    beside_edges,
+    can_tell_beside,
+    less_sure,
+    u_of_rivals_px,
+    with_structure,
+)
 
 # Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
 MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.01}
@@ -105,6 +114,7 @@ def learnt_from_profiles(
     assumed = prior.response.curve
     fits, misfit = _fitted(profiles, coding, assumed.name if assumed.name in CURVES else "")
     scenes, bare = _with_scenes(fits, wide, coding)
+    every = scenes
     if bare < UNLIKELY:
         fits, misfit = scenes, _misfit(scenes)
         scenes = []
@@ -122,9 +132,12 @@ def learnt_from_profiles(
     if not prior.response.is_known:
         camera = _with_response(camera, fits, scenes, coding)
     if camera.response.curve is assumed and wide:
-        same = [fit for fit in (scenes or fits) if fit.family.name == assumed.name]
+        same = [fit for fit in every if fit.family.name == assumed.name]
         if any(fit.scene is not NOTHING for fit in same):
             camera = replace(camera, beside=beside_edges(same, wide))
+    if every and coding is not Coding.INTERFRAME:
+        u_px = u_of_rivals_px(every, probabilities(every), wide, camera.response.curve.name)
+        camera = replace(camera, beside=less_sure(camera.beside, u_px))
     return camera
 
 

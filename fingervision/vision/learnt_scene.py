@@ -25,6 +25,8 @@ DISCREPANCY = {Coding.LOSSLESS: 0.004, Coding.INTRAFRAME: 0.006, Coding.INTERFRA
 BESIDE_PX = 12.0
 # Probability of nothing beside the edges above which nothing is learnt.
 SURE = 0.99
+# Probability of what may lie beyond two standard uncertainties.
+UNCOVERED = 0.05
 # Mean chi-square of a bin above which nothing that is known explains the edges.
 MOST_MISFIT = 1.15
 
@@ -108,15 +110,19 @@ def beside_edges(fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile]) -> Be
         sums = values[:, ends].sum(axis=1)
         own = np.array([misfit * fit.at_covariance[np.ix_(ends, ends)].sum() for fit in fits])
         own += np.array([(fit.scene.u_form * np.abs(fit.at_px[ends]).sum()) ** 2 for fit in fits])
-        return float(np.sqrt(weight @ (own + (sums - weight @ sums) ** 2)))
+        return _covering_u(sums - weight @ sums, np.sqrt(own), weight)
 
     inner, outer = mean(at, False), mean(at, True)
     # A wall or a light from one side displaces the sides that show it, and what all sides have in common also the tips.
     common = np.zeros_like(at)
     for own, fit in zip(common, fits, strict=True):
-        if fit.scene.name != "wall":
-            ends = [[fit.at_px[i] for (k, _), i in place.items() if k == finger] for finger in (0, 1)]
-            own[[place[0, False], place[1, False]]] = [min(each, key=abs) for each in ends]
+        if fit.scene.name == "wall":
+            continue
+        ends = [
+            [fit.at_px[i] for (k, outer), i in place.items() if k == finger and (outer or not fit.scene.has_wall)]
+            for finger in (0, 1)
+        ]
+        own[[place[0, False], place[1, False]]] = [min(each, key=abs, default=0.0) for each in ends]
     name = best.scene.name or "shadow"
     return BesideEdges(
         name,
@@ -127,4 +133,56 @@ def beside_edges(fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile]) -> Be
         mean(common, False),
         u_sum(at),
         u_sum(far),
+    )
+
+
+def u_of_rivals_px(fits: Sequence[EdgeFit], probability: Floats, profiles: Sequence[EdgeProfile], curve: str) -> float:
+    """Standard uncertainty of the gap, because something beside the edges with another tone curve explains them too.
+
+    Parameters
+    ----------
+    fits : sequence of EdgeFit
+        Fits of scenes and tone curves.
+    probability : ndarray of float, shape (fits,)
+        Their probabilities.
+    profiles : sequence of EdgeProfile
+        Profiles of dark fingers.
+    curve : str
+        Name of the tone curve that is used.
+    """
+    inner = ~np.array([profile.is_outer for profile in profiles])
+    sums = np.array([fit.at_px[inner].sum() for fit in fits])
+    is_used = np.array([fit.family.name == curve for fit in fits])
+    is_rival = ~is_used & np.array([fit.scene is not NOTHING for fit in fits])
+    if not is_used.any():
+        return 0.0
+    used = float(np.average(sums[is_used], weights=np.maximum(probability[is_used], 1e-300)))
+    own = np.sqrt([fit.at_covariance[np.ix_(inner, inner)].sum() for fit in fits])
+    return _covering_u(sums[is_rival] - used, own[is_rival], probability[is_rival])
+
+
+def _covering_u(away: Floats, own: Floats, probability: Floats) -> float:
+    """Standard deviation of alternatives about a value; at least half of what 95 % of the probability lies within.
+
+    Few alternatives far apart are no normal distribution: of two, the less probable one lies beyond two standard
+    deviations if its probability is below a quarter (JCGM 101:2008, 5.3.4: coverage interval). Each has its own
+    standard uncertainty.
+    """
+    ends = np.abs(away) + 2.0 * own
+    order = np.argsort(ends)[::-1]
+    farthest = ends[order][np.cumsum(probability[order]) > UNCOVERED]
+    deviation = float(np.sqrt(probability @ (away**2 + own**2)))
+    return max(deviation, 0.5 * float(farthest[0])) if farthest.size else deviation
+
+
+def less_sure(beside: BesideEdges | None, u_px: float) -> BesideEdges | None:
+    """What stands beside the edges, with a further uncertainty of the gap; nothing with it where nothing is known."""
+    if not u_px:
+        return beside
+    nowhere = (0.0, 0.0)
+    known = beside or BesideEdges("", 0.0, nowhere, nowhere, nowhere, nowhere, 0.0, 0.0)
+    return replace(
+        known,
+        u_gap_px=float(np.hypot(known.u_gap_px, u_px)),
+        u_outline_px=float(np.hypot(known.u_outline_px, u_px)),
     )

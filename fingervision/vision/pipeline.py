@@ -6,7 +6,7 @@ Only the module `pipeline` determines the order of the steps.
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import isnan, sqrt
+from math import hypot, isnan, sqrt
 from typing import Any
 
 import cv2
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
-from fingervision.domain.camera import Origin
+from fingervision.domain.camera import CameraModel, Origin
 from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, Pixels
 from fingervision.domain.gap import GapMeasurement, NoGap
@@ -24,7 +24,7 @@ from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges, local_change
 from fingervision.vision.coded_picture import CodedPicture, coded_picture
 from fingervision.vision.defect_pixels import repaired
-from fingervision.vision.edge_moves import STEPS_ALONE, moved_by_recording
+from fingervision.vision.edge_moves import STEPS_ALONE, moved_by_recording, stated_marks
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.gap import LEAST_SURE_PX, TOO_ROUGH, measure_gap
@@ -203,7 +203,7 @@ def _attempt(grey: GreyImage, settings: Settings, coded: CodedPicture) -> _Attem
             attempt = _Attempt(fingers, split)
         else:
             attempt = _measured(grey, split, fingers, light_gap, settings, coded, scale)
-            if settings.camera.beside is None:
+            if not _is_told_beside(settings.camera):
                 attempt = _with_two_tones(attempt, grey, denoised, light_gap, settings, coded, scale)
         if isinstance(attempt.outcome, GapMeasurement) or attempt.outcome.status in FINAL:
             return attempt
@@ -251,13 +251,17 @@ def _edges_and_gap(
         return coded.flanks_displaced_px(upright, found, fingers.orientation, light, top)
 
     may_be_sharpened = settings.camera.sharpening.origin is Origin.ASSUMED
-    if settings.camera.beside is not None:
-        edges = moved_by_recording(edges, settings.camera.beside, settings.is_outline)
+    beside = settings.camera.beside
+    if beside is not None and _is_told_beside(settings.camera):
+        edges = moved_by_recording(edges, beside, settings.is_outline)
     else:
         with suppress(np.linalg.LinAlgError):  # no model describes the structure beside the edges
             edges = with_profile(
                 upright, edges, light, top, settings.is_outline, displaced_px, may_be_sharpened=may_be_sharpened
             )
+        if beside is not None:
+            u_px = [hypot(mark.shift_px, 0.5 * beside.u_gap_px) for mark in edges.marks]
+            edges = replace(edges, marks=stated_marks(edges, u_px))
     if edges.beside == STRIP:
         return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)
@@ -267,6 +271,11 @@ def _edges_and_gap(
     if (apart_px or edges.beside) and isinstance(outcome, GapMeasurement):
         outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside)
     return edges, outcome
+
+
+def _is_told_beside(camera: CameraModel) -> bool:
+    """Whether the recording has told what stands beside the edges, so that a frame need not."""
+    return camera.beside is not None and (bool(camera.beside.name) or camera.beside is STEPS_ALONE)
 
 
 def _with_two_tones(

@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from calib.edge_profile import EdgeProfile
 from calib.edge_response import probabilities
-from calib.edge_scene import NOTHING, SCENES, Scene
+from calib.edge_scene import NOTHING, PAIRS, SCENES, Scene
 from calib.scene_fit import fit_scenes, is_more_beside
 from calib.tone_curves import family
 
@@ -37,6 +37,14 @@ def shadow(t: Floats, is_outer: bool) -> Floats:
     return nothing(t, is_outer) * np.where(t > 0.0, 1.0 - 0.35 * np.clip(1.0 - t / 7.0, 0.0, 1.0), 1.0)
 
 
+def wall_and_line(t: Floats, is_outer: bool) -> Floats:
+    return wall(t, is_outer) + np.where((t < -1.0) & (t > -2.2), 0.4, 0.0)
+
+
+def chamfer(t: Floats, is_outer: bool) -> Floats:
+    return nothing(t, is_outer) + np.where((t < 0.0) & (t > -2.0), 0.37, 0.0)
+
+
 def profiles(light: Callable[[Floats, bool], Floats], at_px: float, rng: np.random.Generator) -> list[EdgeProfile]:
     """Profiles whose zero lies `at_px` inside the edge, as if a step had been fitted there."""
     fine = np.arange(-40.0, 40.0, FINE_PX)
@@ -51,7 +59,9 @@ def profiles(light: Callable[[Floats, bool], Floats], at_px: float, rng: np.rand
 
 
 @pytest.mark.parametrize(
-    ("light", "name"), [(wall, "wall"), (line, "glare"), (shadow, "shadow")], ids=["wall", "line", "shadow"]
+    ("light", "name"),
+    [(wall, "wall"), (line, "glare"), (shadow, "shadow"), (wall_and_line, "glare and wall")],
+    ids=["wall", "line", "shadow", "wall and line"],
 )
 def test_the_edge_is_found_beside_what_displaces_a_step(light: Callable[[Floats, bool], Floats], name: str) -> None:
     rng = np.random.default_rng(21)
@@ -79,7 +89,7 @@ def test_a_bare_edge_is_no_reason_to_look_for_more() -> None:
     assert fits[0].at_px == pytest.approx(0.3, abs=0.06)
 
 
-@pytest.mark.parametrize("scene", [NOTHING, *SCENES])
+@pytest.mark.parametrize("scene", [NOTHING, *SCENES, *PAIRS])
 def test_steps_add_up_to_the_contrast(scene: Scene) -> None:
     rng = np.random.default_rng(23)
     sets = np.array(scene.mean) + np.array(scene.u) * rng.standard_normal((20, len(scene.mean)))

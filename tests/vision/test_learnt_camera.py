@@ -1,5 +1,7 @@
 """The camera that edges show after a codec: what JPEG and H.264 hide is in the uncertainty."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -8,10 +10,16 @@ from scipy.special import ndtr
 
 from calib.camera_response import standard_response
 from calib.edge_profile import EdgeProfile, binned_profile
+from calib.edge_scene import NOTHING
+from calib.scene_fit import fit_scenes
+from calib.tone_curves import fixed_family
 from fingervision.domain.camera import ASSUMED_CAMERA, ResponseEstimate
 from fingervision.domain.frame import Coding
 from fingervision.vision.learnt_camera import learnt_from_profiles
+from fingervision.vision.learnt_scene import DISCREPANCY, beside_edges, less_sure
 from fingervision.vision.response_shift import edge_shift_px, u_edge_px
+from tests.calib.test_edge_scene import chamfer
+from tests.calib.test_edge_scene import profiles as scene_profiles
 
 Floats = NDArray[np.float64]
 # Light of finger and ground, and the Gaussian sigma of a sharp edge (pixels).
@@ -127,3 +135,23 @@ def test_a_drawing_without_noise_has_no_structure() -> None:
     assert bins is not None
     assert not bins.u_structure.any()
     assert bins.u_level.min() > 0.0
+
+
+@pytest.mark.parametrize("seed", [61, 62, 63])
+def test_a_chamfer_that_a_tone_curve_imitates_is_in_the_uncertainty(seed: int) -> None:
+    """An even bright band up to the edge has nearly the profile of a plain edge behind a film's shoulder."""
+    wide = scene_profiles(chamfer, 0.3, np.random.default_rng(seed))
+    narrow = [
+        replace(each, away_px=each.away_px[near], level=each.level[near], u_level=each.u_level[near])
+        for each in wide
+        for near in (np.abs(each.away_px) < 8.0,)
+    ]
+    camera = learnt_from_profiles(narrow, ASSUMED_CAMERA, Coding.LOSSLESS, wide)
+    assert camera.beside is not None
+    fits = fit_scenes(wide, DISCREPANCY[Coding.LOSSLESS], [fixed_family(camera.response.curve)])
+    beside = less_sure(beside_edges(fits, wide), camera.beside.u_gap_px)
+    assert beside is not None
+    plain = next(fit for fit in fits if fit.scene is NOTHING)
+    inner = ~np.array([each.is_outer for each in wide])
+    found = sum(beside.inner_px) if beside.name else float(plain.at_px[inner].sum())
+    assert abs(found - 0.6) < 2.0 * beside.u_gap_px
