@@ -140,7 +140,9 @@ def _contested(state: Searched, reason: str) -> Searched:
     example, a drive that sags under gravity, driven one way for six seconds, was taken for a creep of 16 s.
     """
     found = state.found
-    if not found.best.names or standing_of(state.data, found).is_noise:
+    acting = {name for name in found.best.names if found.problem.effects[name].memory}
+    # A partial cause that depends on the position alone is itself such a curve.
+    if not (found.best.names if found.unknown is None else acting) or standing_of(state.data, found).is_noise:
         return state
     likelier = _likelier(found, likeliest_map, LEAST_GAIN, _acting_in_time(found))
     if likelier is None:
