@@ -12,6 +12,7 @@ from calib.measured_scale import Calibration
 from fingervision.domain.camera import CameraModel, Origin
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement
+from fingervision.domain.one_thread import one_thread
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.temporal_filter import temporal_lag
 from fingervision.vision.defect_pixels import blanked, defect_pixels
@@ -108,6 +109,11 @@ def serve() -> None:
 
 def camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) -> CameraModel:
     """Camera as frames of one recording show it; the camera before if too few of them have a gap."""
+    with one_thread():
+        return _camera_of(frames, settings, scale)
+
+
+def _camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) -> CameraModel:
     settings = replace(settings, camera=_with_defects(settings.camera, frames, settings.bits))
     before = settings.camera
     looks = [(frame, look) for frame in frames if (look := _steps_alone(frame, settings)) is not None]

@@ -19,15 +19,14 @@ variances).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from math import isnan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.loops import loop
+from fingervision.domain.one_thread import one_thread
 from fingervision.vision.finger_end import FingerEnd
 from fingervision.vision.finger_shape import INNER_R, OUTER_R, compared, on_flanks, seen
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
@@ -201,16 +200,10 @@ def _whitening(errors: Floats, least_variance: float) -> Callable[[Floats], Floa
             return white
 
         return whitened
-    with _blas().limit(limits=1, user_api="blas"):
+    with one_thread():
         values, vectors = np.linalg.eigh(errors)
     whitening = (vectors / np.sqrt(np.maximum(values, least_variance))).T
     return lambda columns: whitening @ columns
-
-
-@lru_cache(maxsize=1)
-def _blas() -> ThreadpoolController:
-    """Controller of the threads for linear algebra; several threads take four times the processor time."""
-    return ThreadpoolController()
 
 
 def _correlation(distance: Floats, length: float) -> Floats:
