@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ class Family:
         return curve_response(self.name, self.table(parameters)) if self.mean else _fixed_response(self)
 
 
-@cache
+@lru_cache(maxsize=32)
 def _fixed_response(family: Family) -> CameraResponse:
     """Response of a curve without parameters: one object, because identity tells whether a camera is as assumed."""
     known = family.name in CURVES

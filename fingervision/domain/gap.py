@@ -106,7 +106,8 @@ class GapMeasurement:
         Displacement of the faster finger between even and odd rows of an interlaced picture; zero if both sets of rows
         agree. The gap is the mean of both.
     beside : str
-        Disturbance beside the edges, or which has displaced the edges: wall, shadow, glare, motion, trail, sharpening;
+        Disturbance beside the edges, or which has displaced the edges: wall, shadow, glare (two of these are joined by
+        "and"), motion, trail, sharpening;
         empty if none was found.
     held : HeldPart or None
         The part that the fingers hold; None if no part was found.
