@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import re
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ import cv2
 import numpy as np
 import pytest
 
+from fingervision.live.page_socket import STATE_EVERY_S
+from fingervision.live.session import SILENT_S
 from tests.live.browser import PATIENCE_MS, browser, drag, needs_chromium, opened, says, shown
 
 __all__ = ["browser", "opened"]
@@ -21,6 +24,7 @@ pytestmark = needs_chromium
 # What the page shows has four decimals, the table seven.
 SHOWN_MM = 0.00005
 BAR_PX, BAR_MM = 136, 4.0
+SAID_WITHIN_S = 1.0
 
 
 def no_value_is_left(page: Any, status: str) -> None:
@@ -228,3 +232,52 @@ def test_the_page_fits_a_phone_and_comes_back_after_a_restart(
     page.locator("#connection", has_text="connected").wait_for()
     before = int(page.get_attribute("#picture", "data-shown"))
     shown(page, f"Number(document.querySelector('#picture').dataset.shown) > {before + 5}")
+
+
+@pytest.mark.slow
+def test_a_cut_is_said_within_a_second_and_measuring_resumes(
+    live: Callable[..., Any], opened: Callable[..., Any], camera: Any
+) -> None:
+    view = live(camera.address, "--px-per-mm", "34", "--port", "0")
+    page = opened(view.address)
+    shown(page, "document.querySelector('#status').textContent === 'ok'")
+    shown(page, "document.querySelector('#alarm').hidden")
+    camera.stop()
+    page.locator("#alarm", has_text="No picture for").wait_for()
+    no_value_is_left(page, "no picture")
+    # How soon is counted by the program, and not by a browser that waits for a busy machine.
+    assert SILENT_S + STATE_EVERY_S < SAID_WITHIN_S
+    camera.start()
+    says(page, "The source is back")
+    shown(page, "document.querySelector('#alarm').hidden && Number(document.querySelector('#gap_mm').textContent) > 0")
+
+
+@pytest.mark.slow
+def test_a_recording_that_ends_by_itself_is_in_view(
+    live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
+) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(disk)], capture_output=True, text=True, check=False
+    )
+    if mounted.returncode:
+        pytest.skip(f"a small disk cannot be mounted here: {mounted.stderr.strip()}")
+    try:
+        view = live("simulated", "--port", "0", out=disk / "runs")
+        page = opened(view.address, viewport={"width": 1280, "height": 800})
+        shown(page, "Number(document.querySelector('#picture').dataset.shown) > 5")
+        chart = page.locator("#chart").bounding_box()
+        assert chart["y"] + chart["height"] <= 800  # the chart is in view
+        page.locator("body").press("r")
+        page.locator("#alarm", has_text="Recording has ended").wait_for()
+        box = page.locator("#alarm").bounding_box()
+        assert box["y"] >= 0
+        assert box["y"] + box["height"] <= 800
+        assert page.locator("#alarm", has_text="No space left on device").is_visible()
+        assert page.inner_text("#record") != "Stop"
+        page.wait_for_timeout(500)  # it stays, and measuring goes on
+        assert page.locator("#alarm", has_text="Recording has ended").is_visible()
+        assert view.stop() == 1
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)
