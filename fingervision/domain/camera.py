@@ -7,7 +7,12 @@ pictures of its own, learnt from the recording, or assumed.
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from calib.camera_response import CameraResponse, standard_response
+
+Floats = NDArray[np.float64]
 
 
 class Origin(StrEnum):
@@ -155,6 +160,26 @@ def assumed_response(name: str) -> ResponseEstimate:
 DISCREPANCY = CameraQuantity(0.003)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class AddedLight:
+    """Light that something beside the edges adds to a finger's own blurred step.
+
+    Parameters
+    ----------
+    away_px : ndarray of float, shape (n,)
+        Distance from the finger's own edge outwards, along its normal.
+    share : ndarray of float, shape (2, 3, n)
+        Added light as a share of the contrast between finger and ground: left and right finger; inner flank, outer
+        flank, tip.
+    blur_px : float
+        Standard deviation of the blur, without the width of the pixel.
+    """
+
+    away_px: Floats
+    share: Floats
+    blur_px: float
+
+
 @dataclass(frozen=True, slots=True)
 class BesideEdges:
     """What stands beside the edges of both fingers in a whole recording, and how far it displaces the fitted steps.
@@ -174,6 +199,8 @@ class BesideEdges:
         The same for the tips.
     u_gap_px, u_outline_px : float
         Standard uncertainty of the sum of both inner displacements, to the finger's own edge and to the outline.
+    added : AddedLight or None
+        Light that the cause adds to the finger's own step; None if it is not the same along the whole outline (a wall).
     """
 
     name: str
@@ -184,6 +211,7 @@ class BesideEdges:
     tip_px: tuple[float, float]
     u_gap_px: float
     u_outline_px: float
+    added: AddedLight | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

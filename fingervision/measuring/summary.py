@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from calib.calibration import is_stated
 from calib.measured_scale import Calibration
 from fingervision import __version__
-from fingervision.domain.camera import CameraQuantity, Origin
+from fingervision.domain.camera import BesideEdges, CameraQuantity, Origin
 from fingervision.domain.errors import InputFileError
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
@@ -178,7 +178,7 @@ def _camera(series: GapSeries) -> dict[str, Any]:
             "u": None,
             "origin": camera.defects_origin.value,
         },
-        "beside_edges": None if camera.beside is None else asdict(camera.beside),
+        "beside_edges": None if camera.beside is None else _beside(camera.beside),
     }
 
 
@@ -351,3 +351,8 @@ def _hash_of(file: Path) -> str:
     except OSError as error:
         raise InputFileError(f"{file} could not be read again ({error.strerror}).") from error
     return found.hexdigest()
+
+
+def _beside(beside: BesideEdges) -> dict[str, object]:
+    """Numbers of what stands beside the edges, without the profile of its light."""
+    return {key: value for key, value in asdict(beside).items() if key != "added"}

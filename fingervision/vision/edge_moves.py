@@ -8,12 +8,13 @@ same factor as the edge. After the subtraction and a new fit of the step, no lin
 glare, however much of it was in the line's window.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.camera import BesideEdges
+from fingervision.domain.camera import AddedLight, BesideEdges
 from fingervision.domain.loops import loop
 from fingervision.vision.edge_filters import PIXEL_VARIANCE, Lines, curvature_gain, edge_filters, reach_for
 from fingervision.vision.edge_profile import EdgeMark
@@ -81,8 +82,13 @@ def stated_marks(edges: EdgePoints, u_px: list[float]) -> tuple[EdgeMark, EdgeMa
 STEPS_ALONE = BesideEdges("", 1.0, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), 0.0, 0.0)
 
 
-def moved_by_recording(edges: EdgePoints, beside: BesideEdges, is_outline: bool) -> EdgePoints:
-    """Move the edges along their normal by what the whole recording shows beside them."""
+def moved_by_recording(
+    upright: GreyImage, edges: EdgePoints, light: Floats, beside: BesideEdges, is_outline: bool
+) -> EdgePoints:
+    """Move the edges along their normal by what the whole recording shows beside them.
+
+    Where its light is the same along the whole outline, it is taken off every line, and the step is fitted again.
+    """
     inner = np.array(beside.outline_px if is_outline else beside.inner_px)[:, None]
     outer, tip = np.array(beside.outer_px)[:, None], np.array(beside.tip_px)[:, None]
     # What all sides have in common acts along the normal; a wall on the gap's side alone lies across the fingers.
@@ -90,7 +96,8 @@ def moved_by_recording(edges: EdgePoints, beside: BesideEdges, is_outline: bool)
     moves = tip * np.hypot(1.0, edges.lines.slope) + across
     position = edges.position + edges.lines.outward * moves
     u_px = 0.5 * (beside.u_outline_px if is_outline else beside.u_gap_px)
-    return replace(edges, position=position, marks=stated_marks(edges, [u_px, u_px]), beside=beside.name)
+    moved = replace(edges, position=position, marks=stated_marks(edges, [u_px, u_px]), beside=beside.name)
+    return moved if beside.added is None else _without_added(upright, moved, light, beside.added)
 
 
 # Largest number of rounds in which edge and disturbance are fitted alternately.
@@ -120,6 +127,42 @@ def without_additions(
         Fits to the mean profiles of the left and of the right finger.
     """
     blur = np.array([np.sqrt(max(fit.blur**2 - PIXEL_VARIANCE, 0.04)) for fit in fits])
+    sizes = np.array([fit.share * (fit.blur * np.sqrt(2.0 * np.pi) if kind == GLARE else 1.0) for fit in fits])
+    breadths, blurs = np.array([fit.breadth for fit in fits]), np.array([fit.blur for fit in fits])
+
+    def take_off(levels: Floats, slope: Floats, position: Floats, contrast: Floats) -> None:
+        _take_off(slope, position, contrast, kind, sizes, breadths, blurs, levels)
+
+    return _fitted_again(upright, edges, light, blur, take_off)
+
+
+# The part of the outline that a line crosses, as in `AddedLight`: inner flank, outer flank, tip.
+_PART = np.where(IS_INNER, 0, np.where(IS_ROW, 1, 2))
+
+
+def _without_added(upright: GreyImage, edges: EdgePoints, light: Floats, added: AddedLight) -> EdgePoints:
+    """Return the edges of both fingers, fitted without the light that the whole recording shows beside them."""
+
+    def take_off(levels: Floats, slope: Floats, position: Floats, contrast: Floats) -> None:
+        pixels = levels.shape[-1]
+        away = (np.arange(pixels) - pixels // 2 - position[..., None]) / np.hypot(1.0, slope)[..., None]
+        for finger in range(2):
+            for part in range(3):
+                mine = part == _PART
+                share = np.interp(away[finger, mine], added.away_px, added.share[finger, part])
+                levels[finger, mine] -= contrast[finger, mine, None] * share
+
+    return _fitted_again(upright, edges, light, np.full(2, max(added.blur_px, 0.2)), take_off)
+
+
+def _fitted_again(
+    upright: GreyImage,
+    edges: EdgePoints,
+    light: Floats,
+    blur: Floats,
+    take_off: Callable[[Floats, Floats, Floats, Floats], None],
+) -> EdgePoints:
+    """Fit the steps of all lines and what is taken off beside them alternately."""
     filters = edge_filters(reach_for(float(blur.max())))
     lines = edges.lines
     coarse = np.rint(edges.position).astype(np.intp)
@@ -129,12 +172,10 @@ def without_additions(
     shape, pixels = coarse.shape, levels.shape[-1]
     contrast = np.repeat([[_contrast(edges, k)] for k in range(2)], shape[1], axis=1)
     shared = Lines(lines.slope.ravel(), lines.weight.ravel(), BLUR_OF_LINE)
-    sizes = np.array([fit.share * (fit.blur * np.sqrt(2.0 * np.pi) if kind == GLARE else 1.0) for fit in fits])
-    breadths, blurs = np.array([fit.breadth for fit in fits]), np.array([fit.blur for fit in fits])
     found = np.repeat(blur, 2)
     for number in range(LOOKS):
         seen = levels.copy()
-        _take_off(lines.slope, position, contrast, kind, sizes, breadths, blurs, seen)
+        take_off(seen, lines.slope, position, contrast)
         look = filters.look(seen.reshape(-1, pixels), shared, found, position.ravel())
         position, contrast = look.position.reshape(shape), look.contrast.reshape(shape)
         if number < LOOKS - 1:

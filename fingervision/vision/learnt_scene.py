@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.blurred_step import BlurredStep
 from calib.camera_response import CameraResponse
 from calib.edge_fit import EdgeFit
 from calib.edge_profile import EdgeProfile
 from calib.edge_scene import NOTHING
 from calib.scene_fit import fit_scenes, is_more_beside
 from calib.tone_curves import fixed_family
-from fingervision.domain.camera import BesideEdges
+from fingervision.domain.camera import AddedLight, BesideEdges
 from fingervision.domain.frame import Coding
 from fingervision.vision.flank_profiles import Seen, unclipped_profiles
 
@@ -25,6 +26,8 @@ DISCREPANCY = {Coding.LOSSLESS: 0.004, Coding.INTRAFRAME: 0.006, Coding.INTERFRA
 BESIDE_PX = 12.0
 # Probability of nothing beside the edges above which nothing is learnt.
 SURE = 0.99
+# Extent and spacing of the light that is taken off the lines (pixels), and least weight of a fit that contributes.
+ADDED_PX, ADDED_EVERY_PX, LEAST_WEIGHT = 30.0, 0.1, 1e-3
 # Probability of what may lie beyond two standard uncertainties.
 UNCOVERED = 0.05
 # Mean chi-square of a bin above which nothing that is known explains the edges.
@@ -133,7 +136,39 @@ def beside_edges(fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile]) -> Be
         mean(common, False),
         u_sum(at),
         u_sum(far),
+        None if best.scene.has_wall else _added(fits, weight, side, is_outer, place),
     )
+
+
+def _added(
+    fits: Sequence[EdgeFit],
+    weight: Floats,
+    side: Floats,
+    is_outer: NDArray[np.bool_],
+    place: dict[tuple[int, bool], int],
+) -> AddedLight:
+    """Mean light that the fits without a wall add to a finger's own step."""
+    away = np.arange(-ADDED_PX, ADDED_PX, ADDED_EVERY_PX)
+    total, width, seen = np.zeros((side.size, away.size)), 0.0, 0.0
+    for fit, own in zip(fits, weight, strict=True):
+        if fit.scene.has_wall or own < LEAST_WEIGHT:
+            continue
+        at, share = (each[0] for each in fit.scene.steps(fit.beside[None], side, is_outer))
+        step = BlurredStep.of(fit.shared)
+        blurred, _ = step.at(side[:, None, None] * (away[:, None] - at[:, None]))
+        alone, _ = step.at(side[:, None] * away)
+        blurred, alone = 0.5 + side[:, None, None] * (blurred - 0.5), 0.5 + side[:, None] * (alone - 0.5)
+        total += own * (np.einsum("ebn,en->eb", blurred, share) - alone)
+        width += own * float(np.exp(fit.shared[0]) * np.sqrt(1.0 + 0.25 * np.exp(2.0 * fit.shared[1])))
+        seen += own
+    total /= seen
+    # The zero of a profile is the left finger's inner edge with outward light, and the right one's mirrored.
+    flanks = [
+        [total[place[k, outer]] if (k, outer) in place else total[place[k, False]] for outer in (False, True)]
+        for k in (0, 1)
+    ]
+    shares = np.array([[inner, outer, 0.5 * (inner + outer)] for inner, outer in flanks])
+    return AddedLight(away, shares, width / seen)
 
 
 def u_of_rivals_px(fits: Sequence[EdgeFit], probability: Floats, profiles: Sequence[EdgeProfile], curve: str) -> float:

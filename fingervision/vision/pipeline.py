@@ -253,7 +253,7 @@ def _edges_and_gap(
     may_be_sharpened = settings.camera.sharpening.origin is Origin.ASSUMED
     beside = settings.camera.beside
     if beside is not None and _is_told_beside(settings.camera):
-        edges = moved_by_recording(edges, beside, settings.is_outline)
+        edges = moved_by_recording(upright, edges, light, beside, settings.is_outline)
     else:
         with suppress(np.linalg.LinAlgError):  # no model describes the structure beside the edges
             edges = with_profile(

@@ -46,6 +46,15 @@ def test_what_stands_beside_the_edges_is_learnt_and_taken_off(name: str) -> None
     assert np.abs(error).max() < np.abs(alone).min()
 
 
+def test_a_deep_shadow_is_taken_off_the_whole_outline() -> None:
+    """A shadow displaces a step by more or less on a rounded tip than on a flank."""
+    recording = drawn(9311, 5, Surface(shadow=0.4))
+    film = lossless(recording, CURVES["linear"])
+    error, u = errors(film, recording, learnt(film))
+    assert np.abs(error).max() < 0.1
+    assert np.all(np.abs(error) < 2.0 * u)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_tone_curve_does_not_hide_what_stands_beside_the_edges(name: str) -> None:
