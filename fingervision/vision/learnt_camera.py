@@ -135,7 +135,7 @@ def learnt_from_profiles(
         same = [fit for fit in every if fit.family.name == assumed.name]
         if any(fit.scene is not NOTHING for fit in same):
             camera = replace(camera, beside=beside_edges(same, wide))
-    if every and coding is not Coding.INTERFRAME:
+    if every and not prior.response.is_known and coding is not Coding.INTERFRAME:
         u_px = u_of_rivals_px(every, probabilities(every), wide, camera.response.curve.name)
         camera = replace(camera, beside=less_sure(camera.beside, u_px))
     return camera

@@ -95,7 +95,7 @@ def beside_edges(fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile]) -> Be
     nothing = sum(float(w) for w, fit in zip(weight, fits, strict=True) if fit.scene is NOTHING)
     if nothing > SURE:
         return None
-    best = fits[int(weight.argmax())]
+    best = max(zip(weight, fits, strict=True), key=lambda each: each[0] * (each[1].scene is not NOTHING))[1]
     side = np.array([profile.side for profile in profiles])
     is_outer = np.array([profile.is_outer for profile in profiles])
     # The ground lies to the right of the left finger's inner edge and of the right finger's outer one.
@@ -126,7 +126,7 @@ def beside_edges(fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile]) -> Be
             for finger in (0, 1)
         ]
         own[[place[0, False], place[1, False]]] = [min(each, key=abs, default=0.0) for each in ends]
-    name = best.scene.name or "shadow"
+    name = best.scene.name
     return BesideEdges(
         name,
         float(sum(w for w, fit in zip(weight, fits, strict=True) if fit.scene.name == name)),

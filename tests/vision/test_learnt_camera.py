@@ -12,13 +12,13 @@ from calib.camera_response import standard_response
 from calib.edge_profile import EdgeProfile, binned_profile
 from calib.edge_scene import NOTHING
 from calib.scene_fit import fit_scenes
-from calib.tone_curves import fixed_family
-from fingervision.domain.camera import ASSUMED_CAMERA, ResponseEstimate
+from calib.tone_curves import family, fixed_family
+from fingervision.domain.camera import ASSUMED_CAMERA, ResponseEstimate, stated_camera
 from fingervision.domain.frame import Coding
 from fingervision.vision.learnt_camera import learnt_from_profiles
 from fingervision.vision.learnt_scene import DISCREPANCY, beside_edges, less_sure
 from fingervision.vision.response_shift import edge_shift_px, u_edge_px
-from tests.calib.test_edge_scene import chamfer
+from tests.calib.test_edge_scene import chamfer, nothing
 from tests.calib.test_edge_scene import profiles as scene_profiles
 
 Floats = NDArray[np.float64]
@@ -155,3 +155,19 @@ def test_a_chamfer_that_a_tone_curve_imitates_is_in_the_uncertainty(seed: int) -
     inner = ~np.array([each.is_outer for each in wide])
     found = sum(beside.inner_px) if beside.name else float(plain.at_px[inner].sum())
     assert abs(found - 0.6) < 2.0 * beside.u_gap_px
+
+
+def test_other_tone_curves_are_no_rivals_of_a_stated_one() -> None:
+    """A plain edge behind a film's shoulder, which a linear camera would show with a chamfer."""
+    shoulder = family("shoulder")
+    response = shoulder.response(np.array(shoulder.mean))
+    wide = [
+        replace(each, level=np.interp(each.level, response.light, response.level))
+        for each in scene_profiles(nothing, 0.3, np.random.default_rng(64))
+    ]
+    narrow = [
+        replace(each, away_px=each.away_px[near], level=each.level[near], u_level=each.u_level[near])
+        for each in wide
+        for near in (np.abs(each.away_px) < 8.0,)
+    ]
+    assert learnt_from_profiles(narrow, stated_camera(response), Coding.LOSSLESS, wide).beside is None
