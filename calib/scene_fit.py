@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from calib.edge_fit import START_WIDENED, EdgeData, EdgeFit, derivatives, edge_width, fitted, priors
 from calib.edge_profile import EdgeProfile
@@ -99,4 +99,4 @@ def is_more_beside(profiles: Sequence[EdgeProfile], model_error: float, family: 
     variance, axes = np.linalg.eigh(information)
     is_told = variance > LEAST_TOLD * variance[-1]
     score = (axes.T @ (tried.T @ residual))[is_told] / np.sqrt(variance[is_told])
-    return bool(score @ score > chi2.isf(FALSE_ALARMS, np.count_nonzero(is_told)))
+    return bool(score @ score > chdtri(np.count_nonzero(is_told), FALSE_ALARMS))

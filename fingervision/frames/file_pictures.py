@@ -305,6 +305,39 @@ def pictures(container: av.container.InputContainer, stream: av.VideoStream, pat
         yield None, missing or f"{MISSING} at the end of the file ({at_end})."
 
 
+def picture_times_s(path: Path) -> list[float]:
+    """Times of all pictures of a file, in order of presentation, read from its packets without decoding.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    list of float
+        Times (s); empty unless every packet is one picture with a time of its own and nothing is missing between them,
+        so that the number of a picture in `pictures` is its place in this list.
+    """
+    ticks: list[int] = []
+    with open_container(path) as container:
+        stream = container.streams.video[0]
+        codec, tick_s = stream.codec_context.name, stream.time_base
+        with listening(codec) as heard:
+            for read in _read(container, stream, path, heard):
+                packet = read.packet
+                if read.missing or read.loses_time or read.hole or read.end or read.at_end:
+                    return []
+                if not packet.size:
+                    continue
+                if packet.pts is None or packet.is_discard or packet.is_corrupt or not is_shown(packet, codec):
+                    return []
+                ticks.append(packet.pts)
+        if StreamLosses(container.format.name, stream).is_even or tick_s is None or len(set(ticks)) < len(ticks):
+            return []
+    return [tick * tick_s.numerator / tick_s.denominator for tick in sorted(ticks)]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
     """A packet, with the information on its position that only the next packet gives.

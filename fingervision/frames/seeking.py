@@ -7,6 +7,7 @@ import av
 
 from fingervision.domain.frame import Coding, Frame
 from fingervision.frames import image_folder, video_file
+from fingervision.frames.file_pictures import picture_times_s
 from fingervision.frames.luma import luma
 from fingervision.frames.open_container import open_container
 from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
@@ -36,6 +37,20 @@ def seeking(name: str) -> Seeking | None:
     if image_folder.accepts(name) or not video_file.accepts(name) or not Path(name).is_file():
         return None
     return VideoSeeking(name)
+
+
+def frame_times_s(name: str) -> list[float]:
+    """Times of all frames of a video file (s), read without decoding; empty if its packets do not tell them surely.
+
+    Parameters
+    ----------
+    name : str
+        The recording.
+    """
+    try:
+        return [] if seeking(name) is None else picture_times_s(Path(name))
+    except (av.FFmpegError, OSError, ValueError):
+        return []
 
 
 class VideoSeeking:

@@ -64,8 +64,9 @@ class Heard:
 @contextmanager
 def listening(decoder: str, warnings: tuple[str, ...] = ()) -> Iterator[Heard]:
     """Collect FFmpeg's error log, and keep it off the screen."""
-    before = av.logging.get_level()
+    before, were_skipped = av.logging.get_level(), av.logging.get_skip_repeated()
     plain = av.logging.WARNING if warnings else av.logging.ERROR
+    av.logging.set_skip_repeated(False)  # the damage that was heard last may be met again, by another pass over a file
     av.logging.set_level(av.logging.DEBUG if decoder == "h264" else plain)
     try:
         # The log of all threads is collected, because FFmpeg decodes slices in its own threads.
@@ -73,3 +74,4 @@ def listening(decoder: str, warnings: tuple[str, ...] = ()) -> Iterator[Heard]:
             yield Heard(decoder, warnings, log)
     finally:
         av.logging.set_level(before)
+        av.logging.set_skip_repeated(were_skipped)

@@ -39,7 +39,8 @@ class StreamLosses:
         codec = stream.codec_context
         self._numbers = FrameNumbers(stream) if codec.name == "h264" else None
         self._is_transport = container_format == "mpegts"
-        self._is_even = self._is_transport or codec.name in EVEN_CODECS
+        self.is_even = self._is_transport or codec.name in EVEN_CODECS
+        """Whether the stream's rate is constant, so that frames that are missing between two packets are told."""
         rate, tick_s = codec.framerate, stream.time_base
         self._row = EvenRow(float(1 / (rate * tick_s)) if rate and tick_s else None)
         self._was_corrupt = False
@@ -49,7 +50,7 @@ class StreamLosses:
 
         Return a sentence if whole frames are missing from a series with equidistant times.
         """
-        if not (self._is_even and packet.dts is not None and self._row.leaps(packet.dts)):
+        if not (self.is_even and packet.dts is not None and self._row.leaps(packet.dts)):
             return ""
         if self._numbers is None:
             trail.hole("Frames are missing before this frame.")
@@ -89,7 +90,7 @@ class FrameNumbers:
     def __init__(self, stream: av.VideoStream) -> None:
         self._steps: deque[int] = deque(maxlen=STEPS)
         self._tick: int | None = None
-        self._is_even = True  # whether the last steps agree
+        self.is_even = True  # whether the last steps agree
         self._since_key, self._key_every, self._has_seen_key = 0, 0, False
         # Picture number at which the recovery is complete, and number of pictures since its start.
         self._recovering: tuple[int, int] | None = None
@@ -127,7 +128,7 @@ class FrameNumbers:
         """Whether as many pictures may be missing as make the numbers agree again."""
         if missing >= self._modulus - 1:
             # Where the times are uneven anyway, the camera paused: a loss agrees with the numbers by chance only.
-            return self._is_even
+            return self.is_even
         return is_due and missing >= self._header(packet, heard).get("frame_num", self._modulus)
 
     def _missing(self, tick: int | None) -> int:
@@ -137,7 +138,7 @@ class FrameNumbers:
         if step is None or step <= 0:
             return 0
         usual = median(self._steps) if self._steps else step
-        self._is_even = all(abs(one - usual) <= TICKS for one in self._steps)
+        self.is_even = all(abs(one - usual) <= TICKS for one in self._steps)
         self._steps.append(step)
         return round(step / usual) - 1 if step > LEAP_SHARE * usual else 0
 

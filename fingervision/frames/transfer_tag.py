@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 import av
@@ -44,11 +45,17 @@ def transfer_tag(files: tuple[Path, ...]) -> str | None:
     if len(files) > 1:
         return None
     try:
-        with open_container(files[0]) as container:
-            video = next(iter(container.streams.video), None)
-            return None if video is None else _of_video(video.codec_context)
+        return _of_container(files[0], files[0].stat().st_mtime_ns)
     except (av.FFmpegError, OSError, ValueError):
         return None
+
+
+@lru_cache(maxsize=1)
+def _of_container(path: Path, changed_ns: int) -> str | None:
+    """Tag of a video as it was at that time; to open one reads its whole index, which takes long for an hour."""
+    with open_container(path) as container:
+        video = next(iter(container.streams.video), None)
+        return None if video is None else _of_video(video.codec_context)
 
 
 def _of_video(codec: av.VideoCodecContext) -> str | None:

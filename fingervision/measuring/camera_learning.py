@@ -1,8 +1,5 @@
 """First pass over a recording: learn its camera from the first frames with a gap, then give these frames back."""
 
-import pickle
-import subprocess
-import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
@@ -13,6 +10,7 @@ from fingervision.domain.camera import CameraModel, Origin
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.one_thread import one_thread
+from fingervision.domain.own_process import in_own_process
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.temporal_filter import temporal_lag
 from fingervision.vision.defect_pixels import blanked, defect_pixels
@@ -25,7 +23,6 @@ from fingervision.vision.pipeline import Settings, look_closely, region_of_inter
 # Number of frames with a gap from which the camera is learnt: five show all sub-pixel positions of slightly tilted
 # flanks, twelve average their noise. Fewest frames; most frames that are read for them, and pixels that are kept.
 WANTED, FEWEST, MOST_READ, MOST_KEPT_PX = 12, 3, 60, 15_000_000
-PROGRAM = "import sys; sys.path[:] = {path!r}; from fingervision.measuring.camera_learning import serve; serve()"
 
 Learn = Callable[[Sequence[Frame], Settings, Scale | None], CameraModel]
 
@@ -85,26 +82,7 @@ def learnt_first(
 
 def camera_beside(frames: Sequence[Frame], settings: Settings, scale: Scale | None) -> CameraModel:
     """`camera_of` in a process of its own, so that the threads of this one go on: the fits take seconds in Python."""
-    sent = pickle.dumps((frames, settings, scale))
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", PROGRAM.format(path=sys.path)],
-            input=sent,
-            capture_output=True,
-            check=True,
-            # Ctrl-C in the terminal is for this process, which may still complete a run.
-            start_new_session=True,
-        )
-    except (OSError, subprocess.SubprocessError):  # no memory for a second process, or no interpreter
-        return camera_of(frames, settings, scale)
-    camera: CameraModel = pickle.loads(done.stdout)  # of this program's own process, from a private pipe
-    return camera
-
-
-def serve() -> None:
-    """In the process of its own: read frames from standard input and write their camera to standard output."""
-    frames, settings, scale = pickle.load(sys.stdin.buffer)
-    sys.stdout.buffer.write(pickle.dumps(camera_of(frames, settings, scale)))
+    return in_own_process(camera_of, frames, settings, scale)
 
 
 def camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) -> CameraModel:

@@ -4,7 +4,7 @@ from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from fingervision.domain.effect import Array
 
@@ -175,7 +175,7 @@ def on_lines(input_mm: Array, runs: tuple[slice, ...]) -> Array:
         return input_mm
     jitter = np.abs(values - (np.round(values / step - shift) + shift) * step) / step
     sigma = float(np.sqrt(-2.0 * np.log(np.abs(peak[best])))) / (2.0 * np.pi)
-    between = 2.0 * float(norm.sf(BETWEEN / sigma))
+    between = 2.0 * float(ndtr(-BETWEEN / sigma))
     # A motion in equal steps lies exactly on lines, and values between the lines are then not jitter.
     if np.mean(jitter < ON_LINE) > EXACT_SHARE or np.mean(jitter > BETWEEN) > 1.5 * between + 0.005:
         return input_mm

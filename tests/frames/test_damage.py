@@ -305,3 +305,15 @@ def test_frames_missing_in_an_even_row_are_noticed() -> None:
     assert [tick for tick in (0, 40, 600, 640) if other.leaps(tick)] == []
     # A camera that is late by a fifth of a step left nothing out.
     assert not any(row.leaps(tick) for tick in (1200, 1240, 1280, 1328, 1360))
+
+
+def test_frames_cut_out_of_a_matroska_file_are_noticed_by_every_reading(tmp_path: Path) -> None:
+    path = tmp_path / "cut.mkv"
+    content = coded(path, "ffv1", **FFV1)
+    path.write_bytes(content[: len(content) // 2] + content[len(content) // 2 + 5000 :])
+    for _ in range(3):  # the reader of the file says the same of it each time
+        found = read(path)
+        (hole,) = [item.index for item in found if item.time_s is None]
+        times_s = [[item.time_s for item in part if isinstance(item, Frame)] for part in (found[:hole], found[hole:])]
+        assert len(found) < COUNT
+        assert times_s[1][0] - times_s[0][-1] > 1.5 / RATE_HZ

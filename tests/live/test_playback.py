@@ -17,6 +17,7 @@ from calib.calibration import BareScale
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.frame_range import frame_range
+from fingervision.frames.seeking import frame_times_s
 from fingervision.frames.source import open_source
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
@@ -49,6 +50,8 @@ CODINGS = {
     "h264.mp4": ("-c:v", "libx264", "-g", "25", "-bf", "3", "-crf", "16", "-pix_fmt", "yuv420p"),
     "one_key.mp4": ("-c:v", "libx264", "-g", "600", "-crf", "16", "-pix_fmt", "yuv420p"),
     "mjpeg.avi": ("-c:v", "mjpeg", "-q:v", "3", "-pix_fmt", "yuvj420p"),
+    # A camera whose times are uneven, and pictures that are coded in another order than they are shown.
+    "uneven.mp4": ("-vf", "setpts=(N+0.3*mod(7*N\\,5))/25/TB", "-fps_mode", "vfr", "-bf", "3", "-pix_fmt", "yuv420p"),
 }
 
 
@@ -86,6 +89,41 @@ def test_every_frame_is_the_one_it_says_in_any_order(recordings: dict[str, Path]
             reader._kept.clear()
     assert reader.at(FRAMES, None) is None
     assert isinstance(reader.at(3, None), Frame)
+
+
+@pytest.mark.parametrize("name", CODINGS)
+def test_frames_have_their_times_before_they_are_measured(
+    recordings: dict[str, Path], tmp_path: Path, name: str
+) -> None:
+    source = open_source(str(recordings[name]))
+    times_s = [item.time_s for item in source]
+    assert frame_times_s(str(recordings[name])) == times_s
+    # Without a scale nothing is measured: the packets alone tell which frame is the one of a time.
+    view = Playback(recorded(str(recordings[name]), None, Choices(), ()), tmp_path / "out")
+    view.start()
+    try:
+        until(lambda: [view.frame_at(time_s) for time_s in times_s] == [*range(FRAMES)])
+    finally:
+        view.stop()
+
+
+@pytest.mark.parametrize("name", ["ffv1.mkv", "h264.mp4", "mjpeg.avi"])
+def test_frames_of_a_damaged_recording_are_counted_where_packets_do_not_number_them(
+    recordings: dict[str, Path], tmp_path: Path, name: str
+) -> None:
+    rng = Random(5)
+    whole = recordings[name].read_bytes()
+    for _ in range(6):
+        place = rng.randrange(len(whole) // 10, len(whole))
+        damaged = tmp_path / name
+        damaged.write_bytes(whole[:place] + whole[place + rng.choice([3, 300, 3000]) :])
+        try:
+            source = open_source(str(damaged))
+        except FingervisionError:
+            continue  # an MP4 file whose index is gone
+        times_s = [item.time_s for item in source]
+        told = frame_times_s(str(damaged))
+        assert told == times_s[: len(told)]
 
 
 def test_a_time_that_no_frame_has_is_not_taken_for_a_neighbours(recordings: dict[str, Path]) -> None:

@@ -11,8 +11,9 @@ from typing import Any
 
 from fingervision.domain.errors import DataError, LimitError
 from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.own_process import in_own_process
 from fingervision.domain.status import Status
-from fingervision.frames.seeking import Seeking, seeking
+from fingervision.frames.seeking import Seeking, frame_times_s, seeking
 from fingervision.frames.source import Description
 from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF
 from fingervision.live.frame_measurement import Seen
@@ -21,7 +22,7 @@ from fingervision.live.playback.track import Track, arguments_of
 from fingervision.live.supervisor import Supervisor, told
 from fingervision.live.view import Message, MessageListener, Messages
 from fingervision.measuring.marked import marked
-from fingervision.storage.gaps_csv import GapRow
+from fingervision.storage.gaps_csv import TIME_PLACES, GapRow
 from fingervision.storage.lost_frames import lost_frames
 
 # Access to single frames of a recording by number, which never returns a different frame.
@@ -151,12 +152,15 @@ class Playback:
         self._generation = 0
         self._identity = secrets.token_hex(4)
         marks = lost_frames(self.description.files)
+        self._is_marked = bool(marks)
         source = opened.source
         self._reader = FrameReader(
             lambda: iter(marked(source, marks) if marks else source),
             opened.name,
             are_files=self.description.kind == "images",
         )
+        # Times from the packets, for frames that the table has not reached.
+        self._times_s: list[float] = []
         self._shown: object = None
         self._requests = 0
         self._stopped = False
@@ -169,6 +173,8 @@ class Playback:
         """Start the measurement and the display."""
         self._measure_anew()
         self._thread = self.supervisor.start(PLAYING, self._play)
+        if not self._is_marked:
+            self.supervisor.start("Reading the times of the recording", self._read_times)
 
     def stop(self) -> None:
         """Stop the measurement and the display."""
@@ -298,8 +304,8 @@ class Playback:
 
     def state(self) -> dict[str, Any]:
         """Return the state of the playback, for the browser page."""
-        counts = Counter(row.status for row in self.rows(0, self.row_count))
         description = self.description
+        counts: Counter[Status] = Counter() if self._track is None else self._track.counts
         return {
             "source": description.name,
             "kind": description.kind,
@@ -339,15 +345,26 @@ class Playback:
             self.supervisor.clear(MEASURING)
             self._changed.notify_all()
 
+    def _read_times(self) -> None:
+        # What FFmpeg says of damage is heard by all threads, so that one reader's damage would be taken for another's.
+        self._times_s = [round(time_s, TIME_PLACES) for time_s in in_own_process(frame_times_s, self.recorded.name)]
+
+    def _told_time(self, frame: int) -> float | None:
+        """Time of a frame (s) by its packet; None if the table so far shows that packets do not number the frames."""
+        last = self._row(self.row_count - 1)
+        is_refuted = last is not None and self._times_s[last.frame : last.frame + 1] != [last.time_s]
+        return None if is_refuted or frame >= len(self._times_s) else self._times_s[frame]
+
     def _row(self, frame: int) -> GapRow | None:
         track = self._track
-        return track.rows[frame] if track is not None and frame < len(track.rows) else None
+        return track.rows[frame] if track is not None and 0 <= frame < len(track.rows) else None
 
     def _time_of(self, frame: int) -> float:
         row = self._row(frame)
         if row is not None and row.time_s is not None:
             return row.time_s
-        return frame / (self.description.rate_hz or USUAL_RATE_HZ)
+        told_s = self._told_time(frame)
+        return frame / (self.description.rate_hz or USUAL_RATE_HZ) if told_s is None else told_s
 
     def _play(self) -> None:
         while not self._stopped:
@@ -410,8 +427,10 @@ class Playback:
             )
 
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
-        """Time of a frame (s); None if the frame has no picture, or if a neighbouring frame has the same time."""
-        if row is None or row.time_s is None or row.status in NO_PICTURE:
+        """Time by which a frame is found (s); None without a picture, or if a neighbouring frame has the same time."""
+        if row is None:
+            return self._told_time(frame)
+        if row.time_s is None or row.status in NO_PICTURE:
             return None
         neighbours = [self._row(frame - 1) if frame else None, self._row(frame + 1)]
         return None if any(each is not None and each.time_s == row.time_s for each in neighbours) else row.time_s

@@ -1,10 +1,12 @@
 """Table of a recording that `fingervision measure` writes, read while it grows."""
 
 import tempfile
+from collections import Counter
 from pathlib import Path
 
 from calib.calibration import is_stated
 from calib.measured_scale import Calibration
+from fingervision.domain.status import Status
 from fingervision.live.background import WAITED_FOR, BackgroundCommand
 from fingervision.live.choices import Choices
 from fingervision.storage.gaps_csv import GapRow, GapsReader
@@ -57,6 +59,8 @@ class Track:
         self.table = Path(self._folder.name) / GAPS
         self.failure = ""
         self.is_whole = False
+        self.counts: Counter[Status] = Counter()
+        """Number of rows so far with each status."""
         self._reader = GapsReader(self.table)
         self._command: BackgroundCommand | None = BackgroundCommand(
             *arguments, "--out", self._folder.name, niceness=WAITED_FOR
@@ -72,7 +76,11 @@ class Track:
         if self._command is None:
             return False
         ended = self._command.exit_code
+        counted = self.counts.total()
         is_other = self._reader.refresh()
+        if is_other or counted > len(self.rows):
+            counted, self.counts = 0, Counter()
+        self.counts.update(row.status for row in self.rows[counted:])
         if ended is None:
             return is_other
         complaint = self._command.complaint
