@@ -60,13 +60,13 @@ def write_grip(
     rows: dict[str, NDArray[np.float64]] = {}
     said = []
     for kind, model in models.items():
-        if not (isinstance(model, DrawnGripper) or hasattr(model, "grip_force_n")):
+        if not isinstance(model, DrawnGripper):
             click.echo(
                 f"{kind} cannot compute a part between the fingers: grip.csv has no rows of this kind of model.",
                 err=True,
             )
             continue
-        touch = first_grip_mm(model, part) if isinstance(model, DrawnGripper) else None
+        touch = first_grip_mm(model, part)
         limit = _closing_limit_mm(gripper, model, touch)
         at = np.linspace(limit, 0.3 * abs(limit) + (touch or 0.0), _ROWS) if inputs is None else np.sort(inputs)
         if touch is not None and at.min() < touch < at.max():
@@ -165,23 +165,20 @@ def _stiff(part: Part) -> str:
     return f"{part.stiffness_n_mm:g} N/mm" if isfinite(part.stiffness_n_mm) else "rigid"
 
 
-def _closing_limit_mm(gripper: Gripper, model: Any, touch_mm: float | None) -> float:
+def _closing_limit_mm(gripper: Gripper, model: DrawnGripper, touch_mm: float | None) -> float:
     """Input (mm) at which closing ends: past the touch of the part by half the stroke that closes the empty fingers."""
     touch = model.first_touch_mm
     reach = abs(touch) if touch is not None else 0.01 * gripper.body.height_mm
     return (touch_mm or 0.0) - 0.5 * reach
 
 
-def _row(model: Any, input_mm: float, part: Part) -> tuple[float, ...]:
-    if not isinstance(model, DrawnGripper):
-        grip = model.grip_force_n(input_mm, part)
-        return input_mm, np.nan, part.squeezed_mm(grip) if grip > 0.0 else np.nan, grip, np.nan, np.nan
+def _row(model: DrawnGripper, input_mm: float, part: Part) -> tuple[float, ...]:
     loaded = gripped(model, input_mm, part)
     held = part.squeezed_mm(loaded.grip_n) if loaded.grip_n > _BEYOND_MM else np.nan
     return input_mm, loaded.gap_mm, held, loaded.grip_n, loaded.force_n, loaded.stress_mpa
 
 
-def _words(gripper: Gripper, kind: str, model: Any, part: Part, touch_mm: float, error: float) -> str:
+def _words(gripper: Gripper, kind: str, model: DrawnGripper, part: Part, touch_mm: float, error: float) -> str:
     """Sentence on the inputs (mm) at which the part is touched and yields, and on the slope of the gripping force."""
     limit = gripper.material.yield_mpa
     step = 0.2 * abs(model.first_touch_mm or touch_mm)

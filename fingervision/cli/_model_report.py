@@ -15,7 +15,6 @@ from fingervision.models.gripper_figures import input_at_yield_mm, life_over
 from fingervision.models.kinds import by_trust, small_displacements_alone
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import MechanismModel
-from fingervision.models.notch import notches_of
 from fingervision.models.physics import Physics
 from fingervision.models.strips import necks_of
 
@@ -49,18 +48,6 @@ def say_what_limits(
     for kind in figures:
         if small_displacements_alone(kind) and len(models) > 1 and physics != Physics():
             click.echo(f"Note: the model kind {kind} always computes small displacements without contact.")
-        if kind == "stiffness_matrix" and figures[kind].out_of_plane_modes_hz:
-            click.echo(_out_of_plane_limit(gripper, figures[kind]))
-
-
-def _out_of_plane_limit(gripper: Gripper, figures: ModelFigures) -> str:
-    wide = max(notch.plate_mm / notch.thickness_mm for notch in notches_of(gripper))
-    return (
-        "Note: the model kind stiffness_matrix joins bars at points and computes the torsion of a hinge between rigid "
-        f"planes. At a width over thickness of {wide:.3g}, its first frequency out of the plane is exact within "
-        f"{100.0 * figures.out_of_plane_error:.2g} %, its sag within {100.0 * figures.sag_error:.2g} %. The model kind "
-        "finite_element has three dimensions: its first frequency is exact within 1 %, its sag within 2 %."
-    )
 
 
 def _warn_of_stress(gripper: Gripper, model: Any, inputs: NDArray[np.float64]) -> None:

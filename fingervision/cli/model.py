@@ -231,7 +231,8 @@ def command(
         from fingervision.cli._model_sweep import write_uncertainty
         from fingervision.models.uncertainty import gripper_uncertainty
 
-        spread = gripper_uncertainty(gripper, inputs, HingeTheory(hinge), physics)
+        across = any(row["first_out_of_plane_mode_hz"] is not None for row in rows.values())
+        spread = gripper_uncertainty(gripper, inputs, HingeTheory(hinge), physics, across_plane=across)
         write_uncertainty(spread, rows, gripper_toml.stem, out, as_json=as_json)
     move(models, asked, gripper_toml.stem, folders, out, as_json=as_json)
     if part is not None:

@@ -16,14 +16,13 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Material
 from fingervision.models.flexure import Flexure, stretched_share
 from fingervision.models.hinge_correction import SWAY_SHEAR, HingeTheory, hinge_ratio, sway_shear
-from fingervision.models.notch import Notch, beam_compliance
+from fingervision.models.notch import Notch, beam_compliance, timoshenko_compliance
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Polygon
 from fingervision.models.plane_stress import PlaneStressPlate
 
 Array = NDArray[np.float64]
 
-_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _SEGMENTS, _SEGMENTS_OF_LEAF = 10, 20
 """Number of segments of a notch, which bends at its neck, and of a leaf or straight neck, which bends along its whole
 length: the relative error from replacing an arc by n chords is about 1 / n^2."""
@@ -113,8 +112,8 @@ class FlexureSpan:
         if self.flexure.is_notch:
             notch = self.notch(plate_mm)
             wide = notch if width_effect else replace(notch, plate_mm=_NARROW * notch.thickness_mm)
-            root = np.sqrt(hinge_ratio(wide, material, theory)[[0, 1, 5]])
-            parts = np.array([beam_compliance(notch, material, span)[_PLANAR] for span in spans])
+            root = np.sqrt(hinge_ratio(wide, material, theory))
+            parts = np.array([beam_compliance(notch, material, span) for span in spans])
             found = root[:, None] * parts * root
             if corrected:
                 # The shear of a notch's sections differs from that of a straight beam, and the correction for bending
@@ -146,9 +145,8 @@ def _segment(
     E, G, b = material.youngs_modulus_mpa / bent, material.shear_modulus_mpa, plate_mm
     bending = [float(np.sum(dx * arm**k * 12.0 / (E * b * h**3))) for k in range(3)]
     shear = float(_SHEAR * np.sum(dx / (G * b * h)))
-    return np.array([[stretched * float(np.sum(dx / (material.youngs_modulus_mpa * b * h))), 0.0, 0.0],
-                     [0.0, bending[2] + shear, bending[1]],
-                     [0.0, bending[1], bending[0]]])  # fmt: skip
+    along = stretched * float(np.sum(dx / (material.youngs_modulus_mpa * b * h)))
+    return timoshenko_compliance(along, shear, bending)
 
 
 def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:

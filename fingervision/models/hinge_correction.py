@@ -6,9 +6,8 @@ The second ratio is the restraint of a hinge by the plate's width, from quadrati
 with nu^2 (nu: Poisson's ratio). The third ratio, for a hinge in a body, is the compliance between elastic blocks over
 the compliance between rigid planes, because the blocks deform where the notch joins them. For a neck of thickness t in
 a notch of radius R and a plate of width b, with t / R = 0.25 and b / t = 3, the brick model is 1.05 times as compliant
-as beam theory in bending, 1.08 times in tension, and 0.78 times in torsion, where warping is restrained. Between the
-nodes of the table, ratios are interpolated over log(t / R) and log(b / t); beyond the ends of the table they are
-constant, except in torsion, where the ratio continues to fall with (t / b)^2.
+as beam theory in bending, and 1.08 times in tension. Between the nodes of the table, ratios are interpolated over log(t
+/ R) and log(b / t); beyond the ends of the table they are constant.
 """
 
 from enum import StrEnum
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from fingervision.domain.gripper import Material
-from fingervision.models.notch import Notch, beam_compliance
+from fingervision.models.notch import Notch
 
 Array = NDArray[np.float64]
 
@@ -36,76 +35,76 @@ _B_OVER_T = (0.5, 1.0, 3.0, 10.0, 30.0, 100.0)
 _POISSON = 0.34
 """Poisson's ratio of the tables. The effect of the width on the in-plane compliance is proportional to nu^2: the factor
 for plane strain is 1 - nu^2."""
-_X, _Y, _ABOUT_X, _ABOUT_Z = 0, 1, 3, 5
+_X, _TURN = 0, 2
 
-# First index: t / R; second index: b / t; third index: displacements x, y, z, rotations about x, y, z.
+# First index: t / R; second index: b / t; third index: along, across, rotation.
 _BRICKS_OVER_BEAM = (
     (
-        (1.0352, 1.0013, 0.9772, 0.9792, 0.9805, 1.0013),
-        (1.0352, 1.0013, 0.9846, 0.9864, 0.9874, 1.0013),
-        (1.0351, 0.9992, 1.0084, 0.9779, 1.0079, 0.9992),
-        (1.0345, 0.9707, 1.0313, 0.7946, 1.0252, 0.9707),
-        (1.0289, 0.9169, 1.0392, 0.3187, 1.0312, 0.9169),
-        (0.9938, 0.8939, 1.0119, 0.0414, 1.0199, 0.8939),
+        (1.0352, 1.0013, 1.0013),
+        (1.0352, 1.0013, 1.0013),
+        (1.0351, 0.9992, 0.9992),
+        (1.0345, 0.9707, 0.9707),
+        (1.0289, 0.9169, 0.9169),
+        (0.9938, 0.8939, 0.8939),
     ),
     (
-        (1.0471, 1.0089, 0.9866, 0.9764, 0.9909, 1.0088),
-        (1.0471, 1.0088, 1.0011, 0.9850, 1.0031, 1.0087),
-        (1.0468, 1.0048, 1.0302, 0.9602, 1.0252, 1.0048),
-        (1.0453, 0.9633, 1.0506, 0.6702, 1.0402, 0.9631),
-        (1.0332, 0.9151, 1.0487, 0.1957, 1.0422, 0.9150),
-        (0.9787, 0.8980, 0.9808, 0.0216, 1.0183, 0.8979),
+        (1.0471, 1.0089, 1.0088),
+        (1.0471, 1.0088, 1.0087),
+        (1.0468, 1.0048, 1.0048),
+        (1.0453, 0.9633, 0.9631),
+        (1.0332, 0.9151, 0.9150),
+        (0.9787, 0.8980, 0.8979),
     ),
     (
-        (1.0610, 1.0193, 1.0006, 0.9717, 1.0039, 1.0191),
-        (1.0608, 1.0191, 1.0230, 0.9834, 1.0208, 1.0188),
-        (1.0599, 1.0118, 1.0552, 0.9277, 1.0442, 1.0115),
-        (1.0562, 0.9578, 1.0690, 0.5191, 1.0559, 0.9573),
-        (1.0285, 0.9186, 1.0421, 0.1121, 1.0512, 0.9183),
-        (0.9652, 0.9053, 0.9413, 0.0112, 1.0068, 0.9051),
+        (1.0610, 1.0193, 1.0191),
+        (1.0608, 1.0191, 1.0188),
+        (1.0599, 1.0118, 1.0115),
+        (1.0562, 0.9578, 0.9573),
+        (1.0285, 0.9186, 0.9183),
+        (0.9652, 0.9053, 0.9051),
     ),
     (
-        (1.0749, 1.0374, 1.0232, 0.9658, 1.0213, 1.0372),
-        (1.0742, 1.0370, 1.0511, 0.9796, 1.0415, 1.0367),
-        (1.0723, 1.0240, 1.0797, 0.8758, 1.0632, 1.0237),
-        (1.0618, 0.9611, 1.0768, 0.3688, 1.0690, 0.9605),
-        (1.0062, 0.9305, 1.0054, 0.0614, 1.0498, 0.9302),
-        (0.9591, 0.9200, 0.9177, 0.00578, 0.9895, 0.9197),
+        (1.0749, 1.0374, 1.0372),
+        (1.0742, 1.0370, 1.0367),
+        (1.0723, 1.0240, 1.0237),
+        (1.0618, 0.9611, 0.9605),
+        (1.0062, 0.9305, 0.9302),
+        (0.9591, 0.9200, 0.9197),
     ),
     (
-        (1.0843, 1.0762, 1.0594, 0.9468, 1.0466, 1.0808),
-        (1.0825, 1.0748, 1.0818, 0.9715, 1.0637, 1.0794),
-        (1.0761, 1.0484, 1.0934, 0.7812, 1.0771, 1.0527),
-        (1.0311, 0.9815, 1.0411, 0.2037, 1.0670, 0.9852),
-        (0.9725, 0.9604, 0.9515, 0.0269, 1.0147, 0.9639),
-        (0.9500, 0.9526, 0.9054, 0.00247, 0.9653, 0.9561),
+        (1.0843, 1.0762, 1.0808),
+        (1.0825, 1.0748, 1.0794),
+        (1.0761, 1.0484, 1.0527),
+        (1.0311, 0.9815, 0.9852),
+        (0.9725, 0.9604, 0.9639),
+        (0.9500, 0.9526, 0.9561),
     ),
     (
-        (1.0729, 1.0962, 1.0683, 0.9152, 1.0513, 1.1229),
-        (1.0689, 1.0923, 1.0813, 0.9788, 1.0620, 1.1193),
-        (1.0484, 1.0474, 1.0688, 0.6771, 1.0639, 1.0730),
-        (0.9765, 0.9910, 0.9866, 0.1210, 1.0273, 1.0124),
-        (0.9401, 0.9755, 0.9268, 0.0148, 0.9677, 0.9959),
-        (0.9279, 0.9699, 0.9011, 0.00135, 0.9362, 0.9899),
+        (1.0729, 1.0962, 1.1229),
+        (1.0689, 1.0923, 1.1193),
+        (1.0484, 1.0474, 1.0730),
+        (0.9765, 0.9910, 1.0124),
+        (0.9401, 0.9755, 0.9959),
+        (0.9279, 0.9699, 0.9899),
     ),
     (
-        (1.0500, 1.0787, 1.0560, 0.8837, 1.0396, 1.1399),
-        (1.0423, 1.0704, 1.0611, 0.9953, 1.0445, 1.1321),
-        (1.0016, 1.0149, 1.0319, 0.5878, 1.0347, 1.0692),
-        (0.9311, 0.9732, 0.9535, 0.0870, 0.9772, 1.0191),
-        (0.9070, 0.9618, 0.9127, 0.0104, 0.9262, 1.0054),
-        (0.8990, 0.9578, 0.8969, 0.00095, 0.9041, 1.0006),
+        (1.0500, 1.0787, 1.1399),
+        (1.0423, 1.0704, 1.1321),
+        (1.0016, 1.0149, 1.0692),
+        (0.9311, 0.9732, 1.0191),
+        (0.9070, 0.9618, 1.0054),
+        (0.8990, 0.9578, 1.0006),
     ),
     (
-        (0.9924, 0.9917, 1.0105, 0.8109, 0.9973, 1.1120),
-        (0.9720, 0.9736, 1.0072, 1.0074, 0.9923, 1.0883),
-        (0.9008, 0.9292, 0.9664, 0.4734, 0.9560, 1.0145),
-        (0.8537, 0.9096, 0.9128, 0.0607, 0.8844, 0.9806),
-        (0.8410, 0.9042, 0.8906, 0.00717, 0.8515, 0.9712),
-        (0.8366, 0.9025, 0.8848, 0.00066, 0.8387, 0.9681),
+        (0.9924, 0.9917, 1.1120),
+        (0.9720, 0.9736, 1.0883),
+        (0.9008, 0.9292, 1.0145),
+        (0.8537, 0.9096, 0.9806),
+        (0.8410, 0.9042, 0.9712),
+        (0.8366, 0.9025, 0.9681),
     ),
 )
-# Plane stress between rigid planes, by t / R: along, across, about z.
+# Plane stress between rigid planes, by t / R: along, across, rotation.
 _PLANES_OVER_BEAM = (
     (1.0359, 1.0050, 1.0050),
     (1.0480, 1.0100, 1.0099),
@@ -116,7 +115,7 @@ _PLANES_OVER_BEAM = (
     (1.0610, 1.0904, 1.1513),
     (1.0149, 1.0129, 1.1381),
 )
-# Plane stress, elastic blocks over rigid planes, by t / R: along, about z.
+# Plane stress, elastic blocks over rigid planes, by t / R: along, rotation.
 _BLOCKS_OVER_PLANES = (
     (1.0245, 1.0000),
     (1.0353, 1.0001),
@@ -158,87 +157,44 @@ def _sway_ratio(t_over_r: float) -> float:
 
 @lru_cache(maxsize=1)
 def _by_t_over_r() -> tuple[PchipInterpolator, PchipInterpolator, PchipInterpolator]:
-    """Curves over log(t / R) of three ratios: by b / t, plane stress over beam theory, blocks over planes."""
+    """Curves over log(t / R): shares of plane strain by b / t, plane stress over beam theory, blocks over planes."""
     table = np.array(_BRICKS_OVER_BEAM)
     shares = (1.0 - table / table[:, :1, :]) / _POISSON**2
-    mixed = np.where(np.isin(np.arange(6), (_X, _Y, _ABOUT_Z)), shares, np.log(table))
-    tables = (mixed, np.array(_PLANES_OVER_BEAM), np.array(_BLOCKS_OVER_PLANES))
+    tables = (shares, np.array(_PLANES_OVER_BEAM), np.array(_BLOCKS_OVER_PLANES))
     bricks, plane, blocks = (PchipInterpolator(np.log(_T_OVER_R), rows, axis=0) for rows in tables)
     return bricks, plane, blocks
 
 
 @lru_cache(maxsize=512)
-def _bricks(t_over_r: float, b_over_t: float) -> tuple[float, ...]:
-    """Interpolate shares of plane strain (along x, along y, about z) and ratios of the other directions."""
+def _shares(t_over_r: float, b_over_t: float) -> tuple[float, ...]:
+    """Interpolate shares of plane strain."""
     if t_over_r < _T_OVER_R[0]:
         # The ratio that matters is that of the width to the length that bends, sqrt(t R).
         b_over_t *= np.sqrt(t_over_r / _T_OVER_R[0])
     at = np.log(np.clip(t_over_r, _T_OVER_R[0], _T_OVER_R[-1]))
-    row = _by_t_over_r()[0](at)
-    curves = PchipInterpolator(np.log(_B_OVER_T), row, axis=0)
-    values = curves(np.log(np.clip(b_over_t, _B_OVER_T[0], _B_OVER_T[-1])))
-    # In a wide plate, torsion bends the strips of the plate: the ratio to beam theory falls with the square of the
-    # width.
-    values[_ABOUT_X] -= 2.0 * np.log(max(b_over_t / _B_OVER_T[-1], 1.0))
-    return tuple(values.tolist())
+    curves = PchipInterpolator(np.log(_B_OVER_T), _by_t_over_r()[0](at), axis=0)
+    return tuple(curves(np.log(np.clip(b_over_t, _B_OVER_T[0], _B_OVER_T[-1]))).tolist())
 
 
 def plane_strain_share(notch: Notch) -> float:
     """Degree to which the width restrains the notch in bending: 0 for plane stress, 1 for plane strain."""
-    share = _bricks(notch.curvature_ratio, notch.plate_mm / notch.thickness_mm)[_ABOUT_Z]
+    share = _shares(notch.curvature_ratio, notch.plate_mm / notch.thickness_mm)[_TURN]
     return min(max(share, 0.0), 1.0)
 
 
 def planes_ratio(notch: Notch, material: Material) -> Array:
-    """Ratio of the compliance between rigid end planes to beam theory, shape (6,)."""
-    bricks = np.array(_bricks(notch.curvature_ratio, notch.plate_mm / notch.thickness_mm))
-    ratio: Array = np.exp(bricks)
+    """Ratio of the compliance between rigid end planes to beam theory: along, across, rotation, shape (3,)."""
+    shares = np.array(_shares(notch.curvature_ratio, notch.plate_mm / notch.thickness_mm))
     at = np.log(np.clip(notch.curvature_ratio, _T_OVER_R[0], _T_OVER_R[-1]))
-    plane = _by_t_over_r()[1](at)
-    for place, value in zip((_X, _Y, _ABOUT_Z), plane.tolist(), strict=True):
-        ratio[place] = value * (1.0 - bricks[place] * material.poisson_ratio**2)
-    return ratio
-
-
-def blocks_over_planes(notch: Notch) -> Array:
-    """Ratio of the compliance between elastic blocks to that between rigid planes, shape (6,)."""
-    at = np.log(np.clip(notch.curvature_ratio, _T_OVER_R[0], _T_OVER_R[-1]))
-    along, bending = _by_t_over_r()[2](at)
-    ratio = np.ones(6)
-    ratio[_X], ratio[_ABOUT_Z], ratio[_Y] = along, bending, bending
-    return ratio
+    return np.asarray(_by_t_over_r()[1](at) * (1.0 - shares * material.poisson_ratio**2))
 
 
 def hinge_ratio(notch: Notch, material: Material, theory: HingeTheory) -> Array:
-    """Ratio of the compliance of a notch in a body to that by beam theory, shape (6,); all ratios are 1 for `BEAM`."""
+    """Ratio of the compliance of a notch in a body to that by beam theory, shape (3,); all ratios are 1 for `BEAM`."""
     if theory is HingeTheory.BEAM:
-        return np.ones(6)
-    ratio = planes_ratio(notch, material) * blocks_over_planes(notch)
+        return np.ones(3)
+    at = np.log(np.clip(notch.curvature_ratio, _T_OVER_R[0], _T_OVER_R[-1]))
+    along, bending = planes_ratio(notch, material)[[_X, _TURN]] * _by_t_over_r()[2](at)
     # Across the hinge, use the ratio of bending, so that the segments of a notch together are as compliant as the whole
     # notch.
-    ratio[_Y] = ratio[_ABOUT_Z]
-    return ratio
-
-
-def corrected_compliance(notch: Notch, material: Material) -> Array:
-    """Compliance of a notch between rigid end planes, corrected by finite elements.
-
-    The correction multiplies the matrix by a diagonal matrix from both sides, which keeps it symmetric and positive
-    definite; the entries that couple displacement and rotation then agree with brick elements within 0.3 %.
-
-    Returns
-    -------
-    ndarray of float, shape (6, 6)
-        Order and units as in `beam_compliance`.
-    """
-    return _scaled(beam_compliance(notch, material), planes_ratio(notch, material))
-
-
-def hinge_compliance(notch: Notch, material: Material, theory: HingeTheory) -> Array:
-    """Compliance of a notch in a body: between elastic blocks if corrected, or by beam theory."""
-    return _scaled(beam_compliance(notch, material), hinge_ratio(notch, material, theory))
-
-
-def _scaled(compliance: Array, ratio: Array) -> Array:
-    root = np.sqrt(ratio)
-    return np.asarray(np.outer(root, root) * compliance)
+    return np.array([along, bending, bending])

@@ -12,7 +12,6 @@ from scipy.sparse import coo_matrix, csr_matrix, identity
 
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper, PointMm
-from fingervision.models.bars import SEGMENTS, BarFrame
 from fingervision.models.body_assembly import SegmentMass, assemble_bodies, frame_vibration
 from fingervision.models.condensed_bodies import OwnModes
 from fingervision.models.corotational_frame import CorotationalFrame, turned_axes
@@ -35,6 +34,7 @@ from fingervision.models.mechanism_faces import (
 from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.stiffness_matrix import ERRORS_OF_BARS
 from fingervision.models.triangulate import PlaneMesh, triangulate
 from fingervision.models.width_effect import force_uncertainty
 
@@ -385,10 +385,6 @@ TRUST, WHY_TRUSTED = 2, "both models replace the hinges by beams, and the lumped
 _ERRORS = ModelErrors(0.002, 0.015, 0.02, 0.015)
 """Relative model errors, from finite elements of other grippers: slope within 0.03 %, force 0.9 %, first modes 0.4 %
 (`tests/benchmarks/models_held_out.py`), grip on a part 0.5 % (`models_grip.py`)."""
-_ERRORS_OF_BARS = ModelErrors(0.01, 0.03, 0.2, 0.35)
-"""Relative model errors with bars only, and of beam theory: bars bend up to the point where their axes meet, unlike the
-real body. Slope and force are hardly affected, but the grip and the first mode are 31 % and 18 % off where the cross
-bar is 5 mm wide between bars of 9 mm."""
 
 
 class LumpedGripper(DrawnGripper):
@@ -402,10 +398,6 @@ class LumpedGripper(DrawnGripper):
         Which effects beyond small displacements are included.
     theory : HingeTheory
         Theory of the hinges' compliance.
-    bars_alone : bool
-        Whether the bodies are modelled by bars joined at points, which takes a hundredth of the time.
-    segments : int
-        With `bars_alone`, segments per notch; n in Hricko & Havlik (2015).
     """
 
     name = KIND
@@ -415,20 +407,11 @@ class LumpedGripper(DrawnGripper):
         gripper: Gripper,
         physics: Physics = LINEAR,
         theory: HingeTheory = HingeTheory.CORRECTED,
-        *,
-        bars_alone: bool = False,
-        segments: int = SEGMENTS,
     ) -> None:
-        elastic: ElasticMechanism
-        if bars_alone:
-            elastic, errors = BarFrame(gripper, theory, segments), _ERRORS_OF_BARS
-        else:
-            elastic = MechanismFrame(half_mechanism(gripper), theory=theory)
-            force = _ERRORS.force + 2.0 * force_uncertainty(gripper.material)
-            errors = ModelErrors(_ERRORS.slope, force, _ERRORS.mode, _ERRORS.grip)
-            if theory is HingeTheory.BEAM:
-                errors = _ERRORS_OF_BARS
-        super().__init__(gripper, physics, elastic, errors)
+        errors = replace(_ERRORS, force=_ERRORS.force + 2.0 * force_uncertainty(gripper.material))
+        if theory is HingeTheory.BEAM:
+            errors = ERRORS_OF_BARS
+        super().__init__(gripper, physics, MechanismFrame(half_mechanism(gripper), theory=theory), errors)
 
 
 def build(gripper: Gripper, physics: Physics, theory: HingeTheory) -> LumpedGripper:

@@ -1,5 +1,6 @@
 """Shape of a notch on both sides of a bar: circular or elliptic."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
@@ -129,14 +130,13 @@ def masses_t(notch: Notch, material: Material, edges_mm: Array) -> Array:
     return np.asarray(material.density_t_mm3 * notch.plate_mm * area)
 
 
-# Compliance of a notch hinge: beam theory integrated along the notch, in all six directions.
+# Compliance of a notch hinge: beam theory integrated along the notch.
 #
-# The load acts at the right end of the notch, x = R; the left end is fixed. The components are ordered as
-# displacements along x, y, z, then rotations about x, y, z, with x along the hinge, y across the hinge in the plane,
-# and z out of the plane. For circular notches, Paros and Weisbord (1965) and Wu and Zhou (2002, Review of Scientific
-# Instruments 73, 3101) give closed formulas, which the quadrature reproduces to ten digits. Beam theory is too stiff,
-# and more so for thicker hinges: compared with a finite-element model at t / R = 0.25, by 5 % in bending and 7 % in
-# tension; in torsion it is 28 % too soft. `corrected_compliance` corrects these errors.
+# The load acts at the right end of the notch, x = R; the left end is fixed. The components are displacements along x
+# and y, and rotation, with x along the hinge and y across it in the plane. For circular notches, Paros and Weisbord
+# (1965) and Wu and Zhou (2002, Review of Scientific Instruments 73, 3101) give closed formulas, which the quadrature
+# reproduces to ten digits. Beam theory is too stiff, and more so for thicker hinges: compared with a finite-element
+# model at t / R = 0.25, by 5 % in bending and 7 % in tension. `hinge_correction` corrects these errors.
 
 _GAUSS = leggauss(160)
 """Gauss-Legendre points and weights: accurate to thirteen digits from t / R = 0.002 to 1."""
@@ -145,7 +145,7 @@ _SHEAR = 6.0 / 5.0
 
 
 def beam_compliance(notch: Notch, material: Material, span_mm: tuple[float, float] | None = None) -> Array:
-    """Integrate the compliance of a notch by beam theory, including shear and Saint-Venant torsion.
+    """Integrate the compliance of a notch by beam theory, including shear.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def beam_compliance(notch: Notch, material: Material, span_mm: tuple[float, floa
 
     Returns
     -------
-    ndarray of float, shape (6, 6)
+    ndarray of float, shape (3, 3)
         Symmetric matrix with entries in mm/N, rad/N = mm/(N mm) and rad/(N mm).
     """
     # With x = a sin(angle) the integrands are smooth at the notch's ends; with sin(angle / 2) = c sinh(s) the peak of 1
@@ -179,12 +179,10 @@ def beam_compliance(notch: Notch, material: Material, span_mm: tuple[float, floa
     h = notch.height_mm(x)
     E, G = material.youngs_modulus_mpa, material.shear_modulus_mpa
     arm = a * np.sin(high) - x
-    return _assemble(
-        along=float(np.sum(dx / (E * b * h))),
-        shear=float(_SHEAR * np.sum(dx / (G * b * h))),
-        about_z=[float(np.sum(dx * arm**k * 12.0 / (E * b * h**3))) for k in range(3)],
-        about_y=[float(np.sum(dx * arm**k * 12.0 / (E * b**3 * h))) for k in range(3)],
-        twist=float(np.sum(dx / (G * torsion_constant_mm4(h, b)))),
+    return timoshenko_compliance(
+        float(np.sum(dx / (E * b * h))),
+        float(_SHEAR * np.sum(dx / (G * b * h))),
+        [float(np.sum(dx * arm**k * 12.0 / (E * b * h**3))) for k in range(3)],
     )
 
 
@@ -196,33 +194,21 @@ def bar_compliance(length_mm: float, width_mm: float, plate_mm: float, material:
     E, G = material.youngs_modulus_mpa, material.shear_modulus_mpa
     area = width_mm * plate_mm
     powers = [length_mm ** (k + 1) / (k + 1) for k in range(3)]
-    return _assemble(
-        along=length_mm / (E * area),
-        shear=_SHEAR * length_mm / (G * area),
-        about_z=[12.0 * p / (E * plate_mm * width_mm**3) for p in powers],
-        about_y=[12.0 * p / (E * plate_mm**3 * width_mm) for p in powers],
-        twist=float(length_mm / (G * torsion_constant_mm4(np.array(width_mm), plate_mm))),
+    return timoshenko_compliance(
+        length_mm / (E * area),
+        _SHEAR * length_mm / (G * area),
+        [12.0 * p / (E * plate_mm * width_mm**3) for p in powers],
     )
 
 
-def torsion_constant_mm4(height_mm: Array, plate_mm: float) -> Array:
-    """Saint-Venant torsion constant of a rectangle.
+def timoshenko_compliance(along: float, shear: float, bending: Sequence[float]) -> Array:
+    """Compliance (x, y, rotation) of a beam at its loaded end.
 
-    J = p q^3 (1/3 - 0.21 q/p (1 - q^4 / (12 p^4))), with p the longer and q the shorter side: Young and Budynas,
-    Roark's Formulas for Stress and Strain, table 10.1.
+    Parameters
+    ----------
+    along, shear : float
+        Compliances in tension and in shear.
+    bending : sequence of float
+        Moments 0, 1 and 2 of the curvature per unit moment about the loaded end.
     """
-    p, q = np.maximum(height_mm, plate_mm), np.minimum(height_mm, plate_mm)
-    return np.asarray(p * q**3 * (1.0 / 3.0 - 0.21 * q / p * (1.0 - q**4 / (12.0 * p**4))))
-
-
-def _assemble(along: float, shear: float, about_z: list[float], about_y: list[float], twist: float) -> Array:
-    C = np.zeros((6, 6))
-    C[0, 0] = along
-    C[1, 1] = about_z[2] + shear
-    C[1, 5] = C[5, 1] = about_z[1]
-    C[5, 5] = about_z[0]
-    C[2, 2] = about_y[2] + shear
-    C[2, 4] = C[4, 2] = -about_y[1]
-    C[4, 4] = about_y[0]
-    C[3, 3] = twist
-    return C
+    return np.array([[along, 0.0, 0.0], [0.0, bending[2] + shear, bending[1]], [0.0, bending[1], bending[0]]])

@@ -17,6 +17,7 @@ from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper, MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import mechanism_figures
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.models.uncertainty import ratios, scaled
 
 Array = NDArray[np.float64]
@@ -119,10 +120,10 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
         check_outline(varied(gripper, variations, corner), f"the variant {_spelt(variations, corner)}")
     rows = []
     by = ratios(sweep_figures(LumpedGripper(gripper, theory=theory)),
-                sweep_figures(LumpedGripper(gripper, theory=theory, bars_alone=True)))  # fmt: skip
+                sweep_figures(StiffnessMatrixGripper(gripper, theory=theory)))  # fmt: skip
     for values in grid:
         drawn = varied(gripper, variations, values)
-        rows.append(scaled(sweep_figures(LumpedGripper(drawn, theory=theory, bars_alone=True)), by))
+        rows.append(scaled(sweep_figures(StiffnessMatrixGripper(drawn, theory=theory)), by))
     return np.array(grid), np.array([list(row.values()) for row in rows], dtype=float)
 
 

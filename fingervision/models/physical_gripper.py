@@ -21,10 +21,10 @@ from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model
 from fingervision.models.laws import laws_of
-from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physics import LINEAR
 from fingervision.models.place_answers import PlaceAnswers
 from fingervision.models.small_answer import DrawnAnswer, SmallAnswer, ratio_curves, small_answer
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 Array = NDArray[np.float64]
 
@@ -41,8 +41,7 @@ class PhysicalGripper:
         The drawing.
     kind : str
         Kind of model. For changed links and hinges its response is scaled by the ratio of the `lumped` model's
-        responses; large rotation and contact are computed by this kind itself (by the lumped model for
-        `stiffness_matrix`).
+        responses; large rotation and contact are computed by this kind itself.
     theory : HingeTheory
         Theory of the hinges' compliance.
     """
@@ -65,8 +64,7 @@ class PhysicalGripper:
         """Formulas for those effects of the catalogue that the drawing determines, by the name of the effect."""
         model = self._model
         if not isinstance(model, DrawnGripper):
-            # For a model limited to small displacements, take a frame of the same members.
-            model = LumpedGripper(self.gripper, theory=self.theory, bars_alone=True, segments=0)
+            model = StiffnessMatrixGripper(self.gripper, theory=self.theory)
         length_mm = self.gripper.lever.l2_mm
         lever = ratio_curves(
             self.gripper,

@@ -18,7 +18,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material, PointMm
 from fingervision.models.condensed_bodies import condensed, face_frame, section_frame
 from fingervision.models.gripper_mechanism import right_of_axis
-from fingervision.models.hinge_correction import HingeTheory, hinge_compliance, hinge_ratio
+from fingervision.models.hinge_correction import HingeTheory, hinge_ratio
 from fingervision.models.notch import bar_compliance, beam_compliance, masses_t, notches_of
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Polygon, bar, box
@@ -35,7 +35,6 @@ from fingervision.models.triangulate import triangulate
 
 Array = NDArray[np.float64]
 
-_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 _STUB = 1.5
 """Length of the stub in widths of the bar: a self-balanced load has decayed to 0.2 % there (Timoshenko and Goodier,
 article 26)."""
@@ -150,15 +149,16 @@ def unit_compliance(shape: BlockShape) -> Array:
     whole = np.linalg.inv(K[np.ix_(moving, moving)])[2:, 2:]
     c, s = along
     axes = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    own = axes @ bar_compliance(_STUB, 1.0, 1.0, material)[_PLANAR] @ axes.T
+    own = axes @ bar_compliance(_STUB, 1.0, 1.0, material) @ axes.T
     back = np.array([[1.0, 0.0, _STUB * s], [0.0, 1.0, -_STUB * c], [0.0, 0.0, 1.0]])
     root = back @ (whole - own) @ back.T
     values, vectors = np.linalg.eigh(0.5 * (root + root.T))
     return np.asarray(vectors @ np.diag(np.maximum(values, _LEAST * values.max())) @ vectors.T)
 
 
-_RIGID = np.zeros((6, 6))
-_PIECES_PER_BAR = 4
+_RIGID = np.zeros((3, 3))
+_PIECES_PER_BAR, _SEGMENTS = 4, 10
+"""Pieces of a bar, and segments of a notch."""
 _LEAST_BAR = 0.01
 """Least length of a bar between a notch and the axis of the cross bar, as a share of the distance between the two."""
 
@@ -175,9 +175,9 @@ class Member:
         Index of the parent in the tree; -1 for the clamp.
     start_mm, end_mm : (float, float)
         Ends of the member's axis.
-    compliance : ndarray of float, shape (6, 6)
-        Compliance at the member's end, with x along its axis, y to the left of it and z towards the viewer; zero for a
-        rigid member.
+    compliance : ndarray of float, shape (3, 3)
+        Compliance (x, y, rotation) at the member's end, with x along its axis and y to the left of it; zero for a rigid
+        member.
     mass_t : float
         Mass, distributed uniformly along the axis.
     width_mm : float
@@ -236,17 +236,12 @@ class _Tree:
             parent = len(self.members) - 1
         return parent
 
-    def hinge(self, parent: int, start: PointMm, end: PointMm, name: str, theory: HingeTheory, segments: int) -> int:
-        """Divide a notch into segments."""
+    def hinge(self, parent: int, start: PointMm, end: PointMm, name: str, theory: HingeTheory) -> int:
+        """Divide a notch into segments, shorter near the neck."""
         material, notch = self.gripper.material, notches_of(self.gripper)[0 if name == "hinge 1" else 1]
-        edges = notch.stations_mm(max(segments, 1))
+        edges = notch.stations_mm(_SEGMENTS)
         masses = masses_t(notch, material, edges)
-        if segments == 0:
-            whole = hinge_compliance(notch, material, theory)
-            self.members.append(Member(name, parent, start, end, whole, float(masses[0]), notch.thickness_mm))
-            return len(self.members) - 1
-        ratio = hinge_ratio(notch, material, theory)
-        root = np.sqrt(ratio[[0, 5, 4, 3, 4, 5]])
+        root = np.sqrt(hinge_ratio(notch, material, theory))
         along = (edges - edges[0]) / (edges[-1] - edges[0])
         points = np.array(start) + np.outer(along, np.subtract(end, start))
         for place, span in enumerate(pairwise(edges.tolist())):
@@ -260,13 +255,7 @@ class _Tree:
         return parent
 
 
-def skeleton_of(
-    gripper: Gripper,
-    theory: HingeTheory,
-    segments: int,
-    *,
-    rigid_links: bool = False,
-) -> Skeleton:
+def skeleton_of(gripper: Gripper, theory: HingeTheory) -> Skeleton:
     """Reduce a drawing to its tree of members.
 
     Parameters
@@ -275,11 +264,6 @@ def skeleton_of(
         The drawing.
     theory : HingeTheory
         Theory of the hinges' compliance.
-    segments : int
-        Segments per hinge, shorter near the neck, each with its own integral; 0 for one segment with the compliance of
-        the whole hinge.
-    rigid_links : bool
-        Whether only the hinges are elastic, as in the equations of Hricko & Havlik (2015).
 
     Raises
     ------
@@ -305,23 +289,17 @@ def skeleton_of(
     # A notch may reach into the cross bar: the root then begins where the notch ends.
     beam_low = max(beam_low, upper1[1] + _LEAST_BAR * (cross_y - upper1[1]))
 
-    def link(parent: int, start: PointMm, end: PointMm, name: str, width_mm: float) -> int:
-        if rigid_links:
-            area_mm2 = width_mm * float(np.hypot(end[0] - start[0], end[1] - start[1]))
-            return tree.rigid(parent, start, end, name, area_mm2, width_mm)
-        return tree.bar(parent, start, end, name, width_mm)
-
-    at = link(-1, (pillar_x, links.pillar_and_root_mm[2]), lower1, "pillar", pillar_width)
-    at = tree.hinge(at, lower1, upper1, "hinge 1", theory, segments)
-    at = link(at, upper1, (pillar_x, beam_low), "root", pillar_width)
+    at = tree.bar(-1, (pillar_x, links.pillar_and_root_mm[2]), lower1, "pillar", pillar_width)
+    at = tree.hinge(at, lower1, upper1, "hinge 1", theory)
+    at = tree.bar(at, upper1, (pillar_x, beam_low), "root", pillar_width)
     foot = _at_height(links.finger_mm, cross_y)
-    at = link(at, (pillar_x, beam_low), (pillar_x, cross_y), "root's joint", pillar_width)
+    at = tree.bar(at, (pillar_x, beam_low), (pillar_x, cross_y), "root's joint", pillar_width)
     shuttle = (*links.shuttle_from_mm, *links.shuttle_to_mm)
     meeting = _at_height(shuttle, cross_y)
-    joint = link(at, (pillar_x, cross_y), meeting, "cross bar", links.cross_bar_width_mm)
+    joint = tree.bar(at, (pillar_x, cross_y), meeting, "cross bar", links.cross_bar_width_mm)
     at = joint
-    at = link(at, meeting, upper2, "stub", links.shuttle_width_mm)
-    at = tree.hinge(at, upper2, lower2, "hinge 2", theory, segments)
+    at = tree.bar(at, meeting, upper2, "stub", links.shuttle_width_mm)
+    at = tree.hinge(at, upper2, lower2, "hinge 2", theory)
     box_mm = links.drive_block_mm
     entry = _at_x(shuttle, box_mm[1])
     if not lower2[0] > entry[0]:
@@ -329,13 +307,12 @@ def skeleton_of(
             f"Hinge 2 must end outside the drive block, at x > {entry[0]:g} mm, but ends at x = {lower2[0]:g} mm; "
             "make the block narrower or lever.l4_mm longer."
         )
-    at = link(at, lower2, entry, "shuttle", links.shuttle_width_mm)
+    at = tree.bar(at, lower2, entry, "shuttle", links.shuttle_width_mm)
     drive = tree.rigid(at, entry, lever.drive_mm, "drive block", (box_mm[1] - box_mm[0]) * (box_mm[3] - box_mm[2]),
                        box_mm[3] - box_mm[2])  # fmt: skip
-    if not rigid_links and theory is HingeTheory.CORRECTED:
+    if theory is HingeTheory.CORRECTED:
         tree.members[drive] = _yielding(tree.members[drive], drive_block_compliance(gripper))
-        tree.members[drive] = _bending_out_of_plane(tree.members[drive], gripper)
-    at = link(joint, meeting, foot, "cross bar's end", links.cross_bar_width_mm)
+    at = tree.bar(joint, meeting, foot, "cross bar's end", links.cross_bar_width_mm)
     tip = links.tip_polygon_mm
     tip_low = min(y for _, y in tip)
     below = _at_height(links.finger_mm, tip_low)
@@ -343,26 +320,16 @@ def skeleton_of(
     leaves = _at_height(links.finger_mm, min(cross_y + links.cross_bar_width_mm / 2.0, tip_low))
     within_mm2 = links.finger_width_mm * float(np.hypot(*np.subtract(leaves, foot)))
     at = tree.rigid(at, foot, leaves, "finger's foot", within_mm2, links.finger_width_mm)
-    if not rigid_links:
-        tree.members[at] = _bending_out_of_plane(tree.members[at], gripper)
-    at = link(at, leaves, below, "finger", links.finger_width_mm)
+    at = tree.bar(at, leaves, below, "finger", links.finger_width_mm)
     tip_area = _area_mm2(tip)
     tip_height = gripper.tip_corner_mm[1] - tip_low
     top = [x for x, y in tip if y == max(y for _, y in tip)]
     head = (sum(top) / len(top), gripper.tip_corner_mm[1])
-    at = link(at, below, head, "tip", tip_area / tip_height)
+    at = tree.bar(at, below, head, "tip", tip_area / tip_height)
     corner = tree.rigid(at, head, gripper.tip_corner_mm, "tip's corner")
     heel = tree.rigid(at, head, gripper.tip_heel_mm, "tip's heel")
     measured = tree.rigid(at, head, gripper.measuring_point_mm, "measuring point")
     return Skeleton(tuple(tree.members), drive, corner, heel, measured)
-
-
-def _bending_out_of_plane(member: Member, gripper: Gripper) -> Member:
-    """Give a member the out-of-plane bending and torsion of a bar of its own width."""
-    length = float(np.hypot(*np.subtract(member.end_mm, member.start_mm)))
-    bar = bar_compliance(length, member.width_mm, gripper.body.plate_mm, gripper.material)
-    bar[_PLANAR] = member.compliance[_PLANAR]
-    return replace(member, compliance=bar)
 
 
 def _yielding(member: Member, at_start: Array) -> Member:
@@ -371,9 +338,7 @@ def _yielding(member: Member, at_start: Array) -> Member:
     c, s = way / np.hypot(*way)
     carried = np.array([[1.0, 0.0, -way[1]], [0.0, 1.0, way[0]], [0.0, 0.0, 1.0]])
     axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    compliance = np.zeros((6, 6))
-    compliance[_PLANAR] = axes @ carried @ at_start @ carried.T @ axes.T
-    return replace(member, compliance=compliance)
+    return replace(member, compliance=axes @ carried @ at_start @ carried.T @ axes.T)
 
 
 def _hinge_ends(centre: PointMm, axis_deg: float, reach: float) -> tuple[PointMm, PointMm]:

@@ -12,7 +12,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.lumped import LumpedGripper
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 Array = NDArray[np.float64]
 
@@ -36,8 +36,8 @@ class SmallAnswer:
 
 
 def small_answer(gripper: Gripper, theory: HingeTheory) -> SmallAnswer:
-    """Compute the response by the lumped model's frame, in a few milliseconds."""
-    bars = LumpedGripper(gripper, theory=theory, bars_alone=True)
+    """Compute the response by the frame of bars, in a few milliseconds."""
+    bars = StiffnessMatrixGripper(gripper, theory=theory)
     return SmallAnswer(bars.rest_gap_mm, bars.gap_per_input, bars.force_per_input_n_mm)
 
 

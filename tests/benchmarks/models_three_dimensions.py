@@ -14,7 +14,6 @@ from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.out_of_plane import out_of_plane
 from fingervision.models.planar_region import PlanarRegion
-from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.models.triangulate import triangulate
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import read_drawing
@@ -84,12 +83,12 @@ def cases() -> list[tuple[str, Mechanism, Gripper | None]]:
         name = f"{row[0].name} x{row[1]:g}, t {row[2]:g}, R {row[3]:g}, plate {row[4]:g}"
         half = half_mechanism(gripper)
         alone = replace(half, mirrored=False, probes={"tip": gripper.measuring_point_mm}, pairs={})
-        found.append((name, alone, gripper))
+        found.append((name, alone))
     other = replace(sample, hinge=replace(sample.hinge, thickness_mm=0.7))
-    found.append(("asymmetric gripper, t 1 and 0.7", whole_mechanism(sample, other, "asymmetric"), None))
+    found.append(("asymmetric gripper, t 1 and 0.7", whole_mechanism(sample, other, "asymmetric")))
     for path in sorted((Path(__file__).parent / "mechanisms").glob("*.toml")):
         mechanism = read_drawing(path).mechanism()
-        found.append((mechanism.name, mechanism, None))
+        found.append((mechanism.name, mechanism))
     return found
 
 
@@ -106,8 +105,8 @@ def main(asked: Namespace) -> None:
     if shutil.which("ccx") is None:
         sys.exit("CalculiX (ccx, Debian package calculix-ccx) must be installed, but is not.")
     print("drawing | largest motion of a probe: finite_element, lumped | force: same | mode in the plane, drive held: "
-          "same | out of the plane: finite_element, stiffness_matrix | s of CalculiX")  # fmt: skip
-    for place, (title, mechanism, gripper) in enumerate(cases()):
+          "same | out of the plane: finite_element | s of CalculiX")  # fmt: skip
+    for place, (title, mechanism) in enumerate(cases()):
         if asked.only is not None and place not in asked.only:
             continue
         region = mechanism.region
@@ -130,7 +129,5 @@ def main(asked: Namespace) -> None:
             cells[1].append(_percent(unit.force_n, solid.force_n))
             cells[2].append(_percent(model.modes_hz(drive_held=True, count=1)[0], flat))
         across = [_percent(out_of_plane(mechanism).modes_hz[0], lifted)]
-        if gripper is not None:
-            across.append(_percent(StiffnessMatrixGripper(gripper).out_of_plane_modes_hz()[0], lifted))
         print(f"{place:2d} {title:44s} | {' | '.join(' '.join(part) for part in (*cells, across))} | {seconds:.0f} s",
               flush=True)  # fmt: skip

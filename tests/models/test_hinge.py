@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingervision.domain.gripper import Material
-from fingervision.models.hinge_correction import corrected_compliance
+from fingervision.models.hinge_correction import planes_ratio
 from fingervision.models.notch import Notch, beam_compliance, circular_notch, masses_t
 from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 from tests.models import hinge_closed_forms as closed
@@ -31,22 +31,25 @@ RIGID_ENDS = {
 BRICKS = {
     (0, 0): 9.247e-4,
     (1, 1): 0.10152,
-    (5, 1): 0.023274,
-    (5, 5): 5.818e-3,
-    (2, 2): 0.02678,
-    (4, 4): 1.234e-3,
-    (3, 3): 4.016e-3,
+    (2, 1): 0.023274,
+    (2, 2): 5.818e-3,
 }
 
 ratios = st.floats(0.02, 1.0)
+
+
+def corrected(notch: Notch) -> np.ndarray:
+    """Compliance between rigid end planes: the correction keeps the matrix symmetric and positive definite."""
+    root = np.sqrt(planes_ratio(notch, PA2200))
+    return np.outer(root, root) * beam_compliance(notch, PA2200)
 
 
 @given(ratio=ratios)
 def test_the_closed_forms_of_beam_theory_are_one_integral(ratio: float) -> None:
     notch = circular_notch(4.0, 4.0 * ratio, 3.0)
     beam = beam_compliance(notch, PA2200)
-    assert closed.paros_weisbord_bending(notch, PA2200) == pytest.approx(beam[5, 5], rel=QUADRATURE)
-    assert closed.wu_zhou_bending(notch, PA2200) == pytest.approx(beam[5, 5], rel=QUADRATURE)
+    assert closed.paros_weisbord_bending(notch, PA2200) == pytest.approx(beam[2, 2], rel=QUADRATURE)
+    assert closed.wu_zhou_bending(notch, PA2200) == pytest.approx(beam[2, 2], rel=QUADRATURE)
     assert closed.wu_zhou_axial(notch, PA2200) == pytest.approx(beam[0, 0], rel=QUADRATURE)
 
 
@@ -54,13 +57,13 @@ def test_the_closed_forms_of_beam_theory_are_one_integral(ratio: float) -> None:
 def test_compliance_scales_with_size_by_dimension(ratio: float, scale: float) -> None:
     small = beam_compliance(circular_notch(1.0, ratio, 1.0), PA2200)
     large = beam_compliance(circular_notch(scale, scale * ratio, scale), PA2200)
-    power = np.array([1, 1, 1, 2, 2, 2])
+    power = np.array([1, 1, 2])
     assert large * np.outer(scale ** (power - 1.0), scale ** (power - 1.0)) * scale == pytest.approx(small, rel=1e-9)
 
 
 @given(ratio=ratios, depth=st.floats(0.1, 10.0), ellipse=st.floats(0.2, 5.0))
 def test_corrected_compliance_is_symmetric_and_passive(ratio: float, depth: float, ellipse: float) -> None:
-    compliance = corrected_compliance(Notch(ratio, 1.0, ellipse, depth), PA2200)
+    compliance = corrected(Notch(ratio, 1.0, ellipse, depth))
     assert np.array_equal(compliance, compliance.T)
     assert np.linalg.eigvalsh(compliance).min() > 0.0
 
@@ -68,17 +71,17 @@ def test_corrected_compliance_is_symmetric_and_passive(ratio: float, depth: floa
 @pytest.mark.parametrize("ratio", RIGID_ENDS)
 def test_errors_of_beam_theory_between_rigid_ends(ratio: float) -> None:
     notch = circular_notch(1.0, ratio, 1.0)
-    beam = np.diag(beam_compliance(notch, PA2200)[PLANAR])
+    beam = np.diag(beam_compliance(notch, PA2200))
     errors = 100.0 * (beam / np.diag(plane_compliance(notch, PA2200)) - 1.0)
     assert errors == pytest.approx(RIGID_ENDS[ratio], abs=POINTS)
 
 
 def test_corrected_hinge_is_that_of_the_bricks() -> None:
     notch = circular_notch(4.0, 1.0, 3.0)
-    bricks, corrected = solid_compliance(notch, PA2200), corrected_compliance(notch, PA2200)
+    bricks, ours = solid_compliance(notch, PA2200)[PLANAR], corrected(notch)
     for place, value in BRICKS.items():
         assert bricks[place] == pytest.approx(value, rel=ENTRY)
-        assert corrected[place] == pytest.approx(value, rel=ENTRY)
+        assert ours[place] == pytest.approx(value, rel=ENTRY)
 
 
 @settings(max_examples=20)

@@ -12,7 +12,6 @@ from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.grip import Part, first_grip_mm, gripped, mechanical_advantage
 from fingervision.models.gripper_figures import endurance, operating_figures
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 ONE_PERCENT = 0.01
 
@@ -50,14 +49,6 @@ def test_grip_is_that_of_finite_elements(gripper: Gripper, cross_bar_mm: float) 
         touch = first_grip_mm(model, part) or 0.0
         grips.append(gripped(model, touch - 0.2, part).grip_n)
     assert grips[0] == pytest.approx(grips[1], rel=0.005)
-
-
-def test_kinds_grip_alike(gripper: Gripper) -> None:
-    """If one corner touches, the stiffness-matrix model and the bar model describe the same bars."""
-    lumped = LumpedGripper(gripper, bars_alone=True)
-    for part in (Part(3.0), Part(3.0, 20.0)):
-        by_matrix = StiffnessMatrixGripper(gripper).grip_force_n(-0.2, part)
-        assert gripped(lumped, -0.2, part).grip_n == pytest.approx(by_matrix, rel=0.01)
 
 
 def test_mechanical_advantage_is_reciprocal(lumped: LumpedGripper) -> None:

@@ -8,9 +8,7 @@ import pytest
 
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import FiniteElementGripper
-from fingervision.models.gripper_mechanism import redrawn
 from fingervision.models.gripper_model import DrawnGripper
-from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physics import Physics
 from fingervision.models.reference_mesh import COMSOL_MM, INPUT_MM, PlaneMesh
@@ -148,42 +146,8 @@ def test_lumped_in_large_rotation(gripper: Gripper) -> None:
     assert large.force_n[1] == pytest.approx(3.824, rel=0.06)
 
 
-def test_stiffness_matrix_with_rigid_links_is_the_two_hinge_figure(gripper: Gripper) -> None:
-    ours = StiffnessMatrixGripper(gripper, HingeTheory.BEAM, rigid_links=True)
-    assert ours.gap_per_input == pytest.approx(7.792, abs=0.001)
-    assert ours.input_stiffness_n_mm == pytest.approx(2.27, abs=0.005)
-
-
 def test_stiffness_matrix_is_near_finite_elements(gripper: Gripper) -> None:
-    for rigid in (False, True):
-        ours = StiffnessMatrixGripper(gripper, rigid_links=rigid)
-        assert ours.gap_per_input == pytest.approx(7.7212, rel=0.015)
-
-
-def test_the_first_mode_out_of_the_plane_is_as_much_too_high_as_the_sag_is_too_small(gripper: Gripper) -> None:
-    ours = StiffnessMatrixGripper(gripper)
-    # Bricks: 62 Hz and 0.105 mm. Bars joined at points lack some of the compliance; for a single compliance, omega^2
-    # sag = g.
-    sag_mm, _ = ours.gravity_sag_mm()
-    missing = np.sqrt(0.105 / sag_mm)
-    assert ours.out_of_plane_modes_hz()[0] == pytest.approx(62.0 * missing, rel=0.02)
-
-
-def test_modes_out_of_the_plane_scale_with_modulus_and_density(gripper: Gripper) -> None:
-    bare = StiffnessMatrixGripper(gripper).out_of_plane_modes_hz(count=3)
-    stiff = redrawn(
-        redrawn(gripper, "material.youngs_modulus_mpa", 3.0 * 1650.0), "material.density_kg_m3", 8.0 * 930.0
-    )
-    assert StiffnessMatrixGripper(stiff).out_of_plane_modes_hz(count=3) == pytest.approx([2.0 / 3.0 * f for f in bare])
-    assert list(bare) == sorted(bare)
-
-
-def test_stiffness_matrix_and_bars_are_the_same_body(gripper: Gripper) -> None:
-    # One model uses flexibilities in six dimensions, the other stiffnesses in the plane; ten segments, joints of finite
-    # stiffness.
-    matrix, frame = StiffnessMatrixGripper(gripper).figures(), LumpedGripper(gripper, bars_alone=True).figures()
-    assert matrix.gap_per_input == pytest.approx(frame.gap_per_input, rel=1e-4)
-    assert matrix.input_stiffness_n_mm == pytest.approx(frame.input_stiffness_n_mm, rel=1e-3)
+    assert StiffnessMatrixGripper(gripper).gap_per_input == pytest.approx(7.7212, rel=0.015)
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from fingervision.models.modal_model import modal_motion
 from fingervision.models.mode_shapes import ModesWanted, mode_shapes
 from fingervision.models.motion_in_time import ReducedMotion
 from fingervision.models.physics import Physics
+from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 # Damping ratio of equation (4) by dimensionless frequency, printed with two or three digits.
 PAPER_RATIOS = {1.0: 0.045, 2.0: 0.376, 5.0: 1.13, 10.0: 2.0, 100.0: 7.7, 1e3: 24.8, 6e3: 61.0, 1e5: 248.0}
@@ -81,7 +82,7 @@ def test_energy_dies_away_and_never_grows() -> None:
 
 def test_stepped_frame_and_modes_vibrate_alike(gripper: Gripper) -> None:
     """A ramp of 4 ms, then free vibration with held drive: modes against time steps in the deformed shape."""
-    bars = LumpedGripper(gripper, bars_alone=True)
+    bars = StiffnessMatrixGripper(gripper)
     frame = bars.elastic.driven
     step_s, rise_s = 5e-5, 4e-3
     time_s = np.arange(241) * step_s
