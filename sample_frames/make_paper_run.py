@@ -12,8 +12,8 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
+from fingervision.storage.drive_csv import read_samples
 from fingervision.storage.recipe_toml import read_recipe, write_recipe
-from fingervision.storage.samples_csv import read_samples
 from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.run.recipe_run import run_recipe

@@ -23,7 +23,7 @@ from fingervision.domain.frame import Frame
 from fingervision.measuring.camera_learning import WANTED, camera_beside
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.clocks.clock import VirtualClock
-from fingervision.testbed.reading import Reading
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.run.synchronised_acquisition import Look, Sight
 
 # Status of work in a thread, following bluesky.protocols.Status: done, callbacks, exception.

@@ -2,16 +2,59 @@
 
 import hashlib
 import html
+import importlib
+import pkgutil
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, cast
 from urllib.parse import quote
 from uuid import uuid4
 
-from fingervision.batch.reduction import Reduction, reduction_of
+import fingervision.batch
 from fingervision.batch.result_folder import replace_text
-from fingervision.batch.task import Cell, Outcome
+from fingervision.batch.task import Cell, Digest, Outcome
 from fingervision.storage.durable import replaced
 from fingervision.storage.row_file import table_text as lines_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Summaries of the results of a command in a table, a plot and small plots, with one module per command.
+
+PREFIX = "results_of_"
+
+
+class Reduction(Protocol):
+    """Protocol of a module `results_of_<command>`."""
+
+    COLUMNS: tuple[str, ...]
+    """Columns of the command's table, after the columns that every command has."""
+
+    def digest_of(self, folder: Path) -> Digest:
+        """Summarise one result folder."""
+        ...
+
+    def draw(self, figure: "Figure", outcomes: Sequence[Outcome]) -> None:
+        """Draw the plot of all results."""
+        ...
+
+
+def reduction_of(command: str) -> Reduction:
+    """Find the module that summarises the results of a command.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        There is no module for this command.
+    """
+    return cast(Reduction, importlib.import_module(f"{fingervision.batch.__name__}.{PREFIX}{command}"))
+
+
+def commands() -> tuple[str, ...]:
+    """Names of the commands whose results a batch can summarise."""
+    names = (module.name for module in pkgutil.iter_modules(fingervision.batch.__path__))
+    return tuple(sorted(name.removeprefix(PREFIX) for name in names if name.startswith(PREFIX)))
+
 
 # Small plot of a curve, embedded in the HTML page.
 

@@ -12,11 +12,10 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from fingervision.batch.fingerprint import stamp_of
 from fingervision.batch.overview import write_overview
 from fingervision.batch.result_folder import Record, is_whole, read_record, remove_left_parts, replace_text
 from fingervision.batch.task import Outcome, Task, failure
-from fingervision.batch.work import outcome_of
+from fingervision.batch.work import outcome_of, stamp_of
 from fingervision.domain.errors import ExitCode, InputFileError, OutputError, UsageError
 
 # Names of result folders: the file name of the input, with as much of its path as makes the name unique.

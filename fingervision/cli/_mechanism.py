@@ -17,10 +17,10 @@ from fingervision.cli._model_motion import MotionAsked, move
 from fingervision.cli._model_report import add_endurance, say_drawing, say_endurance, say_refusals, warn
 from fingervision.cli._model_sweep import solve_mechanism, sweep_mechanism, write_uncertainty
 from fingervision.interface.prediction import figures_csv, figures_text, naming, predict_mechanism
+from fingervision.models.answer_figures import Physics
 from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.physics import Physics
 from fingervision.models.uncertainty import mechanism_uncertainty
 from fingervision.storage.mechanism_toml import read_drawing
 from fingervision.storage.out_folder import make_out_folder

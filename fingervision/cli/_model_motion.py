@@ -157,7 +157,7 @@ def move(
     if asked.band is not None:
         answer_frequencies(models, asked.band, asked.damping, name, out, as_json=as_json)
     if asked.modes is not None:
-        from fingervision.cli._model_modes import write_modes
+        from fingervision.cli._model_frequency import write_modes
 
         shapes = {
             kind: mode_shapes(getattr(model, "elastic", model), asked.modes)

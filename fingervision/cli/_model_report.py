@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Gripper, Material
-from fingervision.models.answer_figures import LoadedState, ModelFigures
+from fingervision.models.answer_figures import LoadedState, ModelFigures, Physics
 from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.gripper_figures import input_at_yield_mm, life_over
 from fingervision.models.kinds import by_trust, small_displacements_alone
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import MechanismModel
-from fingervision.models.physics import Physics
 from fingervision.models.strips import necks_of
 
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper
-from fingervision.domain.with_uncertainty import with_uncertainty
+from fingervision.domain.numbers import with_uncertainty
 from fingervision.models.finite_element import FiniteElementGripper, MechanismPlate
 from fingervision.models.gripper_figures import label_of, unit_of
 from fingervision.models.hinge_correction import HingeTheory

@@ -297,7 +297,7 @@ def _content(path: Path, inside: tuple[Path, ...] = ()) -> str:
     """Hash of a file, and of the files to which a corrected model refers."""
     import hashlib
 
-    from fingervision.batch.fingerprint import content_hash
+    from fingervision.batch.work import content_hash
     from fingervision.storage.plain_file import plain, toml_of, why
 
     try:

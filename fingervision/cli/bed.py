@@ -325,7 +325,7 @@ def steps(steps_toml: Path, figure: Path | None, run_them: bool, bed_name: str) 
     The steps are checked against the limits of the published stage (10 mm, 400 mm/s, 5.5 N), or of the stage of the
     test bed's configuration.
     """
-    from fingervision.storage.steps_toml import read_steps
+    from fingervision.storage.recipe_toml import read_steps
     from fingervision.testbed.manual.step_running import run_sequence, step_limits, steps_table
     from fingervision.testbed.motion.step_checks import planned_sequence
 
@@ -333,7 +333,7 @@ def steps(steps_toml: Path, figure: Path | None, run_them: bool, bed_name: str) 
     motions = planned_sequence(data, limits)
     click.echo(steps_table(motions))
     if figure is not None:
-        from fingervision.testbed.manual.steps_figure import draw_steps
+        from fingervision.testbed.manual.step_running import draw_steps
 
         draw_steps(figure, data.name, motions, limits)
         click.echo(f"plot: {figure}")
@@ -358,6 +358,6 @@ def home(bed_name: str) -> None:
 @bed_option
 def stop(bed_name: str) -> None:
     """Stop the motor, even if another program drives it."""
-    from fingervision.testbed.manual.stopping import stop_bed
+    from fingervision.testbed.manual.manual_control import stop_bed
 
     click.echo(stop_bed(bed_name))

@@ -28,7 +28,7 @@ def command(hide: tuple[str, ...], seed: int, out: Path) -> None:
     If several explanations remain after the first run, the proposed next run is executed as well.
     """
     from fingervision.demonstration.demonstrate import demonstrate, drawn
-    from fingervision.testbed.simulation.parse_injected_effects import hidden_from
+    from fingervision.testbed.simulation.injected_effects import hidden_from
 
     hidden = hidden_from(hide) if hide else drawn(seed)
     click.echo("An effect is hidden in the simulated test bed; its name is shown at the end.")

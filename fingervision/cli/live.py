@@ -243,7 +243,7 @@ def choices_of(
         An option makes no sense.
     """
     from fingervision.domain.direction import Direction
-    from fingervision.domain.region import Region
+    from fingervision.domain.frame import Region
     from fingervision.frames import simulated
     from fingervision.interface.measuring_task import scale_of
     from fingervision.live.choices import Choices

@@ -176,9 +176,9 @@ def command(
     from fingervision.cli._model_motion import motion_asked, move
     from fingervision.cli._model_report import say_refusals, say_what_limits
     from fingervision.interface.prediction import figures_csv, figures_text, predict_gripper
+    from fingervision.models.answer_figures import Physics
     from fingervision.models.hinge_correction import HingeTheory
     from fingervision.models.kinds import kinds
-    from fingervision.models.physics import Physics
     from fingervision.storage.gripper_toml import read_gripper
     from fingervision.storage.mechanism_toml import is_mechanism
     from fingervision.storage.out_folder import began_in, finish_in, make_out_folder

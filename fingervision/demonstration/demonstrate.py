@@ -28,8 +28,7 @@ from fingervision.testbed.run.run_folder import (
     rows_before,
     times_of,
 )
-from fingervision.testbed.simulation.injected_effects import Hidden
-from fingervision.testbed.simulation.parse_injected_effects import usual_values
+from fingervision.testbed.simulation.injected_effects import Hidden, usual_values
 
 # The size of an effect is drawn at random between these multiples of its usual size.
 SIZES = (0.6, 1.4)

@@ -1,4 +1,4 @@
-"""Measured poses of the bodies of a mechanism in a video frame."""
+"""Measured poses of a mechanism's bodies in a video frame, and its flexures at rest."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -45,3 +45,31 @@ class FramePoses:
     frame: int
     time_s: float | None
     poses: Mapping[str, SeenPose]
+
+
+# Measured thickness and place of a flexure at rest.
+
+
+@dataclass(frozen=True, slots=True)
+class FlexureOutline:
+    """Thickness and place of one flexure in the still frames of a recording, each with its standard uncertainty.
+
+    Parameters
+    ----------
+    flexure : str
+        Name of the flexure in the drawing.
+    frames : int
+        Number of still frames.
+    thickness_mm : (float, float)
+        Least height.
+    along_mm : (float, float) or None
+        Distance from the drawn place along the flexure's axis; None for a flexure of constant height.
+    across_mm : (float, float)
+        Distance from the drawn place across the axis.
+    """
+
+    flexure: str
+    frames: int
+    thickness_mm: tuple[float, float]
+    along_mm: tuple[float, float] | None
+    across_mm: tuple[float, float]

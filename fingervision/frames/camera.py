@@ -33,8 +33,7 @@ from fingervision.frames.camera_settings import (
     settled,
 )
 from fingervision.frames.controls import FRAME_RATE, CameraControl
-from fingervision.frames.received import Endable, Received
-from fingervision.frames.source import Description, Wish
+from fingervision.frames.source import Description, Endable, Received, Wish
 
 # Limits of a V4L2 camera's settings, as stated by the driver (Linux).
 #

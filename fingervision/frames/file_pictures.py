@@ -16,9 +16,8 @@ from fingervision.frames.damage import DamageTrail, Picture
 from fingervision.frames.matroska_checksums import BROKEN, UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.missing_references import OWN_RECORDING, is_shown, missing_references
 from fingervision.frames.mp4_durations import NO_SCALE, states_another_duration
-from fingervision.frames.open_container import open_container
+from fingervision.frames.open_container import Heard, listening, open_container
 from fingervision.frames.sound_jpeg import SoundJpeg
-from fingervision.frames.spoken_damage import Heard, listening
 from fingervision.frames.stream_losses import StreamLosses
 
 

@@ -21,8 +21,7 @@ from fingervision.domain.errors import DeviceError, InputFileError, MissingLibra
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
 from fingervision.domain.status import Status
 from fingervision.frames.controls import EXPOSURE, FRAME_RATE, GAIN, CameraControl
-from fingervision.frames.received import Endable, Received
-from fingervision.frames.source import Description, Wish
+from fingervision.frames.source import Description, Endable, Received, Wish
 
 # Features of a GenICam camera: requested at the start, stated by the camera, or changeable while the camera runs.
 #

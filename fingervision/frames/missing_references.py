@@ -26,8 +26,7 @@ from typing import Any
 
 import av
 
-from fingervision.frames.open_container import open_container
-from fingervision.frames.spoken_damage import listening
+from fingervision.frames.open_container import listening, open_container
 
 COUNTED_CODECS = frozenset({"h264", "hevc", "vvc", "mpeg1video", "mpeg2video"})
 """Codecs, by FFmpeg's names, whose missing references are detected elsewhere."""

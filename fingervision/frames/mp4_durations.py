@@ -24,8 +24,7 @@ from pathlib import Path
 
 import av
 
-from fingervision.frames.open_container import open_container
-from fingervision.frames.spoken_damage import listening
+from fingervision.frames.open_container import listening, open_container
 
 # Boxes of an MP4 or QuickTime file, and the tables in them.
 #

@@ -14,13 +14,10 @@ from fingervision.domain.errors import DeviceError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.damage import DamageTrail, Picture
-from fingervision.frames.luma import luma
-from fingervision.frames.open_container import WHATEVER_METADATA
-from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
-from fingervision.frames.received import Endable, OwnPacket, Received
+from fingervision.frames.decoded_picture import EXPORTED, StepTrail, luma
+from fingervision.frames.open_container import STRICT, WHATEVER_METADATA, Heard, listening
 from fingervision.frames.sound_jpeg import SoundJpeg
-from fingervision.frames.source import Description, Wish
-from fingervision.frames.spoken_damage import STRICT, Heard, listening
+from fingervision.frames.source import Description, Endable, OwnPacket, Received, Wish
 from fingervision.frames.stream_losses import StreamLosses
 
 # Names of parameters with which cameras transmit secrets: password, pwd, token, key, auth, user, loginpas and others.

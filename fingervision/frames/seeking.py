@@ -7,10 +7,9 @@ import av
 
 from fingervision.domain.frame import Coding, Frame
 from fingervision.frames import image_folder, video_file
+from fingervision.frames.decoded_picture import EXPORTED, StepTrail, luma
 from fingervision.frames.file_pictures import picture_times_s
-from fingervision.frames.luma import luma
 from fingervision.frames.open_container import open_container
-from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
 from fingervision.frames.video_file import upright, upright_steps
 
 # Largest number of frames that are decoded from a key frame to the wanted frame; beyond it, frames are counted from the

@@ -10,8 +10,7 @@ import numpy as np
 
 from fingervision.domain.errors import UsageError
 from fingervision.domain.frame import Coding, Frame, Pixels
-from fingervision.frames.received import Endable, Received
-from fingervision.frames.source import Description, Wish
+from fingervision.frames.source import Description, Endable, Received, Wish
 
 NAME = "simulated"
 # Scale of the camera, and smallest and largest gap of the gripper (mm), as in the paper (sources in

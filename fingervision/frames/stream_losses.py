@@ -7,9 +7,8 @@ from statistics import median
 import av
 from av.bitstream import BitStreamFilterContext
 
-from fingervision.frames.damage import DamageTrail
-from fingervision.frames.spoken_damage import Heard
-from fingervision.frames.told_times import TICKS, EvenRow
+from fingervision.frames.damage import TICKS, DamageTrail, EvenRow
+from fingervision.frames.open_container import Heard
 
 MISSING = "Frames are missing here: the otherwise equidistant times have a gap."
 LOST_REFERENCE = "A picture on which the frame depends is missing: the numbers of the coded pictures have a gap."

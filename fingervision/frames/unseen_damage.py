@@ -16,8 +16,7 @@ import av
 
 from fingervision.frames.matroska_checksums import UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.missing_references import OWN_RECORDING
-from fingervision.frames.open_container import open_container
-from fingervision.frames.spoken_damage import STRICT, listening
+from fingervision.frames.open_container import STRICT, listening, open_container
 
 FILES_KEPT = 16
 DAMAGE_SEEN = (

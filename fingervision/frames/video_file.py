@@ -13,16 +13,13 @@ from fingervision.domain.errors import DataError, FingervisionError, InputFileEr
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
 from fingervision.domain.quantiser import Quantiser
 from fingervision.domain.status import Status
-from fingervision.frames.damage import DamageTrail
+from fingervision.frames.damage import DamageTrail, believable
+from fingervision.frames.decoded_picture import EXPORTED, StepTrail, luma
 from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
-from fingervision.frames.luma import luma
 from fingervision.frames.matroska_checksums import UNCHECKED_CODECS, ClusterChecksums
-from fingervision.frames.open_container import open_container
-from fingervision.frames.quantiser_steps import EXPORTED, StepTrail
+from fingervision.frames.open_container import STRICT, open_container
 from fingervision.frames.source import Description, Wish
-from fingervision.frames.spoken_damage import STRICT
-from fingervision.frames.told_times import believable
 from fingervision.frames.unseen_damage import unseen_damage
 
 # FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec with both a lossy and a lossless mode (H.264)

@@ -20,7 +20,7 @@ from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.gauges.quantities import Cell
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading, unread
 from fingervision.measuring.scale import Scale
-from fingervision.storage.gauges_csv import GaugeRow, GaugeRows, GaugesCsv
+from fingervision.storage.gauge_files import GaugeRow, GaugeRows, GaugesCsv
 from fingervision.vision.overlay import in_eight_bits
 from fingervision.vision.pipeline import Settings
 

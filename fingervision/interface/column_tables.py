@@ -14,7 +14,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.frames.array_levels import what_it_is
 from fingervision.models.table import TableModel
 from fingervision.storage import drive_csv, measured_table, simulation_table
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.csv_columns import Numbers
 
 DRIVE_COLUMNS = ("time_s", "input_mm")
 

@@ -8,7 +8,7 @@ from typing import Any
 from fingervision.diagnosis.bodies.reference_report import Compared, compare_with_healthy, drawing_svg
 from fingervision.interface.argument_checks import speaks_python
 from fingervision.interface.tables import measured_given, model_given
-from fingervision.storage.flexures_csv import flexures_beside
+from fingervision.storage.bodies_csv import flexures_beside
 from fingervision.storage.out_folder import mark_owner, out_folder
 from fingervision.storage.provenance import Provenance, provenance
 

@@ -18,7 +18,7 @@ from fingervision.interface.frame_sources import Opener
 from fingervision.measuring.in_memory import MeasuredInMemory
 from fingervision.measuring.words import in_one_line, result_sentences
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.storage.gauges_csv import GaugeRow
+from fingervision.storage.gauge_files import GaugeRow
 
 if TYPE_CHECKING:
     import pandas as pd

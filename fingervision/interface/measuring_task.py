@@ -11,7 +11,7 @@ from calib.measured_scale import Calibration as MeasuredScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UsageError
-from fingervision.domain.region import Region
+from fingervision.domain.frame import Region
 from fingervision.frames.array_levels import what_it_is
 from fingervision.gauges.gauge_file import Gauge, read_gauges
 from fingervision.interface.argument_checks import number, one_of, whole_number

@@ -20,7 +20,7 @@ from fingervision.domain.errors import (
 )
 from fingervision.domain.gripper import Gripper
 from fingervision.interface.argument_checks import one_of, path_of, speaks_python
-from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.answer_figures import LINEAR, ModelFigures, Physics
 from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_figures import gripper_figures, unit_of
@@ -30,7 +30,6 @@ from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
-from fingervision.models.physics import LINEAR, Physics
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import MechanismDrawing, is_mechanism, read_drawing
 from fingervision.storage.out_folder import own_folder

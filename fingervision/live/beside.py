@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.domain.errors import DataError
-from fingervision.frames.received import Driven
+from fingervision.frames.source import Driven
 from fingervision.live.bed.bench import Bench
 from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.live_gauges import put_live_gauges

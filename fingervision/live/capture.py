@@ -9,7 +9,7 @@ from time import monotonic
 from fingervision.domain.errors import DeviceError, FingervisionError, StateError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.controls import CameraControl, adjust, controls_of
-from fingervision.frames.received import Driven, LiveSource, OwnPacket, Received
+from fingervision.frames.source import Driven, LiveSource, OwnPacket, Received
 from fingervision.live.supervisor import Supervisor, told
 from fingervision.storage.recorded_video import TICKS_PER_S
 

@@ -7,7 +7,7 @@ from typing import Any
 from calib.measured_scale import Calibration
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import UsageError
-from fingervision.domain.region import Region
+from fingervision.domain.frame import Region
 from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale, scale_for_frames
 from fingervision.measuring.task import Task

@@ -10,8 +10,7 @@ import av
 from fingervision.domain.errors import UsageError
 from fingervision.frames import camera
 from fingervision.frames.network_stream import without_password
-from fingervision.frames.received import LiveSource, Received
-from fingervision.frames.source import CameraWish, Description, FrameSource, Wish, open_source
+from fingervision.frames.source import CameraWish, Description, FrameSource, LiveSource, Received, Wish, open_source
 from fingervision.live.capture import Capture
 
 # Playback of a recording in real time, as if the frames came from a camera.

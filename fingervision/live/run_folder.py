@@ -12,17 +12,25 @@ from fingervision import __version__
 from fingervision.domain.camera import CameraModel
 from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
-from fingervision.frames.received import OwnPacket
-from fingervision.frames.source import Description
+from fingervision.frames.source import Description, OwnPacket
 from fingervision.measuring.camera_learning import camera_beside
 from fingervision.measuring.run_table import Measured, RunTable
 from fingervision.measuring.task import Task
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.durable import remove_empty
 from fingervision.storage.gaps_csv import GapsCsv
-from fingervision.storage.lost_frames import LOST, LostFrames
 from fingervision.storage.recorded_video import RecordedVideo
-from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, SCHEMA, VIDEO, RunFiles, device_of
+from fingervision.storage.run_files import (
+    CALIBRATION,
+    EVENTS,
+    LOST,
+    RUN,
+    SCHEMA,
+    VIDEO,
+    LostFrames,
+    RunFiles,
+    device_of,
+)
 
 GAPS = "gaps.csv"
 RUNS = "????-??-??T??-??-??Z*"

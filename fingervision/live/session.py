@@ -14,7 +14,7 @@ import numpy as np
 from fingervision.domain.errors import StateError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
-from fingervision.frames.received import Driven
+from fingervision.frames.source import Driven
 from fingervision.live.cadence import Cadence
 from fingervision.live.capture import Arrival, Capture, Ended, Happening, OverflowReport
 from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF, Choices

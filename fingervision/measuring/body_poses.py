@@ -12,7 +12,7 @@ from calib.measured_scale import Calibration
 from fingervision.domain.body_poses import COVERED, DAMAGED, NOT_FOUND, OK, OUT_OF_VIEW, FramePoses, SeenPose
 from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
-from fingervision.domain.with_uncertainty import with_uncertainty
+from fingervision.domain.numbers import with_uncertainty
 from fingervision.gauges.picture import Picture, picture_of
 from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.measuring.body_outlines import BodyOutline, outlines_of
@@ -31,8 +31,7 @@ from fingervision.measuring.pose_uncertainty import SharedErrors, SharedPose, in
 from fingervision.measuring.scale import Scale
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import column_name
-from fingervision.storage.bodies_csv import add_channels, write_bodies
-from fingervision.storage.flexures_csv import FLEXURES, write_flexures
+from fingervision.storage.bodies_csv import FLEXURES, add_channels, write_bodies, write_flexures
 from fingervision.vision.outline_chunks import Chunks, EdgeView, FlatMap
 from fingervision.vision.pipeline import Settings
 from fingervision.vision.response_shift import u_edge_px

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from fingervision.domain.flexure_outline import FlexureOutline
+from fingervision.domain.body_poses import FlexureOutline
 from fingervision.measuring.body_outlines import Placement
 from fingervision.models.flexure import Flexure
 

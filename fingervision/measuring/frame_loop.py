@@ -29,7 +29,7 @@ from fingervision.measuring.task import Task
 from fingervision.measuring.temporal_filter import with_lag
 from fingervision.storage.beside import recorded_camera
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.storage.lost_frames import lost_frames
+from fingervision.storage.run_files import lost_frames
 from fingervision.vision.defect_pixels import repaired
 from fingervision.vision.pipeline import Settings, measure_frame
 

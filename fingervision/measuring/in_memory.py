@@ -17,7 +17,7 @@ from fingervision.measuring.task import Task, task_for_frames
 from fingervision.motion.clock.clock_offset import ClockOffset
 from fingervision.motion.drive_at import drive_at
 from fingervision.storage.gaps_csv import TIME_PLACES, GapRow
-from fingervision.storage.gauges_csv import GaugeRow, GaugeRows
+from fingervision.storage.gauge_files import GaugeRow, GaugeRows
 
 
 @dataclass(frozen=True, slots=True, eq=False)

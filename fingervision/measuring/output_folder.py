@@ -18,9 +18,9 @@ from fingervision.measuring.outcome import clock_drawn
 from fingervision.measuring.overlay_video import OverlayVideo
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.storage.gaps_csv import COLUMNS, GapsCsv
-from fingervision.storage.gauges_csv import GaugeRows, GaugesCsv
-from fingervision.storage.lost_frames import lost_frames
+from fingervision.storage.gauge_files import GaugeRows, GaugesCsv
 from fingervision.storage.out_folder import FolderLock, make_out_folder, out_folder
+from fingervision.storage.run_files import lost_frames
 from fingervision.storage.summary_json import recording_of, refuse_other_recording, write_summary
 
 GAPS, SUMMARY, FIGURE, OVERLAY, STEPS = "gaps.csv", "summary.json", "gap.png", "overlay.mp4", "steps"

@@ -10,7 +10,7 @@ from fingervision.domain.camera import CameraModel
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import UsageError
-from fingervision.domain.region import Region
+from fingervision.domain.frame import Region
 from fingervision.frames.source import Description
 from fingervision.gauges.gauge_file import Gauge, check_gauges
 from fingervision.measuring.gap_budget import choose_response

@@ -19,7 +19,7 @@ from scipy.sparse import csr_matrix, identity
 
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper, PointMm
-from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.answer_figures import LINEAR, ModelFigures, Physics
 from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStress, changes
 from fingervision.models.flexure_span import used_in_plate
 from fingervision.models.gripper_mechanism import half_mechanism
@@ -39,7 +39,6 @@ from fingervision.models.mechanism_faces import (
     with_actuators,
 )
 from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, OutOfPlane, out_of_plane
-from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.reference_mesh import mesh_of

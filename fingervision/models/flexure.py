@@ -11,8 +11,7 @@ from numpy.polynomial import polynomial as poly
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import PointMm
-from fingervision.models.hinge_correction import plane_strain_share
-from fingervision.models.notch import Notch
+from fingervision.models.hinge_correction import Notch, plane_strain_share
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar
 from fingervision.models.width_effect import ConstrainedZone
 

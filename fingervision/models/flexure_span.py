@@ -15,8 +15,15 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Material
 from fingervision.models.flexure import Flexure, stretched_share
-from fingervision.models.hinge_correction import SWAY_SHEAR, HingeTheory, hinge_ratio, sway_shear
-from fingervision.models.notch import Notch, beam_compliance, timoshenko_compliance
+from fingervision.models.hinge_correction import (
+    SWAY_SHEAR,
+    HingeTheory,
+    Notch,
+    beam_compliance,
+    hinge_ratio,
+    sway_shear,
+    timoshenko_compliance,
+)
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Polygon
 from fingervision.models.plane_stress import PlaneStressPlate

@@ -8,9 +8,8 @@ from scipy.interpolate import RegularGridInterpolator
 
 from fingervision.models.elastic_mechanism import LargestStress
 from fingervision.models.flexure_span import FlexureSpan
-from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.hinge_correction import HingeTheory, Notch
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.notch import Notch
 
 Array = NDArray[np.float64]
 

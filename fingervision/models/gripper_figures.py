@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper, Material, SNLine
-from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress
+from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress, Physics
 from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import mechanical_advantage
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.mechanism_figures import per_kelvin
-from fingervision.models.physics import Physics
 
 # Largest input of a gripper before its hinges yield.
 

@@ -14,11 +14,10 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
-from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress
+from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress, Physics
 from fingervision.models.elastic_mechanism import ElasticMechanism, pair_distances_mm
 from fingervision.models.mechanism_equilibrium import MechanismEquilibrium
 from fingervision.models.modal_model import GAP, FreeModes, ModalModel
-from fingervision.models.physics import Physics
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import Model
-from fingervision.models.answer_figures import ModelFigures
+from fingervision.models.answer_figures import LINEAR, ModelFigures, Physics
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kind_names import GROUP, built_in_kinds
-from fingervision.models.physics import LINEAR, Physics
 from fingervision.plugins.faults import MisfitError, PluginShapeError
 from fingervision.plugins.origin import Origin
 from fingervision.plugins.registry import Registry

@@ -12,6 +12,7 @@ from scipy.sparse import coo_matrix, csr_matrix, identity
 
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper, PointMm
+from fingervision.models.answer_figures import LINEAR, Physics
 from fingervision.models.body_assembly import SegmentMass, assemble_bodies, frame_vibration
 from fingervision.models.condensed_bodies import OwnModes
 from fingervision.models.corotational_frame import CorotationalFrame, turned_axes
@@ -31,7 +32,6 @@ from fingervision.models.mechanism_faces import (
     per_input_of,
     with_actuators,
 )
-from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.stiffness_matrix import ERRORS_OF_BARS

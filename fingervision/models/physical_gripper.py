@@ -1,4 +1,4 @@
-"""A drawn gripper for the diagnosis: its small-displacement response, and its own formulas for effects.
+"""A drawn gripper or mechanism for the diagnosis: its small-displacement response, and formulas for effects.
 
 Expensive parts of the response (large rotation, contact, changed links) are computed once and interpolated, so that a
 search may evaluate them thousands of times.
@@ -7,21 +7,29 @@ search may evaluate them thousands of times.
 from collections.abc import Mapping
 from copy import copy
 from functools import cached_property
+from math import isfinite
 from operator import attrgetter
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.errors import DataError, UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import Model, PhysicalLaw
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.response import Response
+from fingervision.models.answer_figures import LINEAR
+from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_mechanism import redrawn, whole_mechanism
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model
 from fingervision.models.laws import laws_of
-from fingervision.models.physics import LINEAR
+from fingervision.models.lumped import MechanismFrame
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_chain import MechanismChain
+from fingervision.models.mechanism_figures import MechanismModel
 from fingervision.models.place_answers import PlaceAnswers
 from fingervision.models.small_answer import DrawnAnswer, SmallAnswer, ratio_curves, small_answer
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
@@ -133,3 +141,81 @@ def _own_answer(model: Model) -> SmallAnswer:
     answer = model.respond(np.array([0.0, 1.0]))
     gap, force = answer.gap_mm, answer.force_n
     return SmallAnswer(float(gap[0]), float(gap[1] - gap[0]), 0.0 if force is None else float(force[1]))
+
+
+# Model for the diagnosis of a mechanism whose drawing names its hinges, links and bodies.
+
+GAP = "gap"
+
+
+@runtime_checkable
+class DrawnMechanism(Protocol):
+    """Protocol of a model whose drawing names its hinges, links and bodies."""
+
+    @property
+    def places(self) -> PlaceAnswers:
+        """Object that predicts the gap with one hinge, link or body of the drawing changed."""
+        ...
+
+
+class MechanismModelOfGap:
+    """Model of a mechanism that has a probe pair named `gap`, for small displacements.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The drawing.
+    kind : str
+        Kind of model that computes the gap; predictions for changed hinges, links and bodies always come from the
+        lumped model.
+
+    Raises
+    ------
+    FingervisionError
+        If the mechanism has no probe pair named `gap`.
+    """
+
+    def __init__(self, mechanism: Mechanism, kind: str) -> None:
+        self.mechanism = mechanism
+        if GAP not in mechanism.pairs:
+            raise DataError(
+                f"{mechanism.name} must have a pair of probes called {GAP} to be compared with a measured gap, but has "
+                f'{", ".join(mechanism.pairs) or "none"}: add [[pair]] name = "{GAP}" with of = [two probes].'
+            )
+        model: MechanismModel
+        if kind == "finite_element":
+            model = MechanismPlate(mechanism)
+        elif kind == "stiffness_matrix":
+            model = MechanismChain(mechanism)
+        elif kind == "lumped":
+            model = MechanismFrame(mechanism)
+        else:
+            raise UsageError(f"The kind of model must be finite_element, lumped or stiffness_matrix, but is {kind}.")
+        self._model = model
+        state = model.state(1.0)
+        # Without a stress, the range is a hundredth of the size, as for a gripper whose fingers never touch.
+        limit = 0.01 * mechanism.region.size_mm
+        reach = mechanism.material.yield_mpa / state.stress_mpa if isfinite(state.stress_mpa) else limit
+        touches = [at for at in model.touch_input_mm().values() if abs(at) < reach]
+        self.input_range_mm = (
+            max([-reach, *(at for at in touches if at < 0.0)]),
+            min([reach, *(at for at in touches if at > 0.0)]),
+        )
+        first, last = mechanism.pairs[GAP]
+        apart = np.subtract(mechanism.probes[last], mechanism.probes[first])
+        self._rest_mm = float(np.hypot(*apart))
+        way = apart / self._rest_mm
+        self._left = float(np.dot(state.probes_mm[first], way))
+        self._right = float(np.dot(state.probes_mm[last], way))
+        self._force_n = state.force_n
+
+    def respond(self, input_mm: Array) -> Response:
+        """Compute the response for small displacements; the midline is zero at zero input."""
+        u = np.asarray(input_mm, dtype=float)
+        half = 0.5 * self._rest_mm
+        return Response(-half + self._left * u, half + self._right * u, self._force_n * u)
+
+    @cached_property
+    def places(self) -> PlaceAnswers:
+        """Object that predicts the gap with one hinge, link or body of the drawing changed."""
+        return PlaceAnswers(self.mechanism, self._model if isinstance(self._model, MechanismFrame) else None)

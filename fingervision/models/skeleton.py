@@ -18,8 +18,14 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material, PointMm
 from fingervision.models.condensed_bodies import condensed, face_frame, section_frame
 from fingervision.models.gripper_mechanism import right_of_axis
-from fingervision.models.hinge_correction import HingeTheory, hinge_ratio
-from fingervision.models.notch import bar_compliance, beam_compliance, masses_t, notches_of
+from fingervision.models.hinge_correction import (
+    HingeTheory,
+    bar_compliance,
+    beam_compliance,
+    hinge_ratio,
+    masses_t,
+    notches_of,
+)
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Polygon, bar, box
 from fingervision.models.plane_stress import PlaneStressPlate

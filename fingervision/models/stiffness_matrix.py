@@ -29,17 +29,16 @@ from scipy.sparse import csr_matrix, diags, identity
 
 from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper, PointMm
+from fingervision.models.answer_figures import LINEAR, Physics
 from fingervision.models.corotational_frame import CorotationalFrame
 from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStress
 from fingervision.models.flexure_span import FlexureSpan
 from fingervision.models.flexure_stress import nominal_stress
 from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.gripper_model import DrawnGripper, ModelErrors
-from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.hinge_correction import HingeTheory, bar_compliance, notches_of
 from fingervision.models.mechanism_bodies import BodyPose, bodies_of, rigid_motion
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
-from fingervision.models.notch import bar_compliance, notches_of
-from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.skeleton import skeleton_of
 
 Array = NDArray[np.float64]

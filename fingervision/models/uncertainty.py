@@ -20,6 +20,7 @@ from scipy.stats import qmc
 from fingervision.domain.errors import FingervisionError, ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.parameter import Estimate
+from fingervision.models.answer_figures import LINEAR, Physics
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_figures import gripper_figures
 from fingervision.models.gripper_mechanism import check_outline, half_mechanism, redrawn
@@ -28,7 +29,6 @@ from fingervision.models.lumped import LumpedGripper, MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import mechanism_figures
 from fingervision.models.out_of_plane import out_of_plane
-from fingervision.models.physics import LINEAR, Physics
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.models.triangulate import triangulate
 

@@ -1,6 +1,7 @@
-"""Origin of a part: this package, another distribution, a file, or the present session."""
+"""Entries of a registry: a part or an unusable plug-in, with its origin."""
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,3 +40,36 @@ def of_distribution(name: str, version: str) -> Origin:
 def of_file(path: str) -> Origin:
     """Return the origin of a part that is defined in a file named by the user."""
     return Origin(path, "correct the file, or leave it out")
+
+
+# Entries of a registry: a part with its origin, or an unusable plug-in with the reason.
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry(Generic[T]):
+    """A part with its name and its origin."""
+
+    name: str
+    value: T
+    origin: Origin
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A plug-in that cannot be used, with the reason.
+
+    Parameters
+    ----------
+    name : str
+        Name under which the distribution registers the plug-in.
+    origin : Origin
+        Origin of the plug-in.
+    sentence : str
+        Sentence that states the reason and what to do.
+    """
+
+    name: str
+    origin: Origin
+    sentence: str

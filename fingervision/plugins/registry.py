@@ -20,14 +20,13 @@ from typing import Generic, TypeVar
 
 from fingervision import __version__
 from fingervision.domain.errors import UsageError
-from fingervision.plugins.entry import Entry, Refusal
 from fingervision.plugins.faults import (
     PluginError,
     PluginNameError,
     PluginShapeError,
     PluginVersionError,
 )
-from fingervision.plugins.origin import BUILT_IN, SESSION, Origin, of_distribution, of_file
+from fingervision.plugins.origin import BUILT_IN, SESSION, Entry, Origin, Refusal, of_distribution, of_file
 from fingervision.plugins.watched_import import importing, watched
 
 # Required versions of fingervision, stated by a plug-in's distribution or by inline script metadata (PEP 723).

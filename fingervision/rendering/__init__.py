@@ -4,12 +4,10 @@ The names that this module exports suffice for most purposes; the README.md of t
 rendered and why the result is exact. Calibration objects (`targets`) are imported separately.
 """
 
-from fingervision.rendering.camera import IDEAL_CAMERA, Camera
+from fingervision.rendering.camera import IDEAL_CAMERA, Camera, RadialLens, Tilt
 from fingervision.rendering.finger import EllipticTip, Finger, Highlight, SquareTip
-from fingervision.rendering.lens import RadialLens, Tilt
-from fingervision.rendering.light import EVEN_LIGHT, Light, LightStep
 from fingervision.rendering.picture import exact_grey, render
-from fingervision.rendering.scene import Patch, Rim, Scene, dust
+from fingervision.rendering.scene import EVEN_LIGHT, Light, LightStep, Patch, Rim, Scene, dust
 from fingervision.rendering.truth import TrueEdge, TrueGap, truth
 from fingervision.rendering.two_fingers import two_fingers
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from fingervision.domain.frame import Pixels
-from fingervision.domain.region import Region
+from fingervision.domain.frame import Pixels, Region
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.outline import Line, Outline, Points
 from fingervision.rendering.polygon import union

@@ -7,9 +7,8 @@ import numpy as np
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import DataError
 from fingervision.rendering.finger import Finger, Highlight, SquareTip, Tip, axis_motion, finger_shape, highlight_shape
-from fingervision.rendering.light import EVEN_LIGHT, Light
 from fingervision.rendering.outline import Motion
-from fingervision.rendering.scene import Patch, Rim, Scene
+from fingervision.rendering.scene import EVEN_LIGHT, Light, Patch, Rim, Scene
 from fingervision.rendering.truth import measuring_point
 
 # A finger that extends beyond the frame ends at this distance outside; neither blur nor lens distortion brings this end

@@ -10,7 +10,7 @@ from typing import Any
 
 from fingervision.domain.camera import Origin
 from fingervision.domain.errors import FingervisionError
-from fingervision.domain.reference_slot import ReferenceSlot
+from fingervision.domain.measured_table import ReferenceSlot
 from fingervision.storage.csv_columns import read_columns
 from fingervision.storage.plain_file import json_of
 from fingervision.storage.run_files import RUN

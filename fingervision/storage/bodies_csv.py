@@ -1,4 +1,4 @@
-"""The file bodies.csv: poses of a mechanism's bodies and angles of its hinges in every video frame.
+"""The files bodies.csv (poses of a mechanism's bodies in every frame) and flexures.csv (flexures at rest).
 
 The same quantities can also be added to gaps.csv as columns.
 """
@@ -7,7 +7,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fingervision.domain.body_poses import OK, FramePoses, SeenPose
+from fingervision.domain.body_poses import OK, FlexureOutline, FramePoses, SeenPose
 from fingervision.domain.errors import DataError
 from fingervision.storage.durable import replaced
 from fingervision.storage.row_file import cell, write_table
@@ -96,3 +96,57 @@ def _pairs(pose: SeenPose) -> list[tuple[str, ...]]:
 
 def _has(frames: object, name: str, part: str) -> bool:
     return any(getattr(poses[name], part) is not None for poses in frames)  # type: ignore[attr-defined]
+
+
+# The file flexures.csv: thickness and place of a mechanism's flexures at rest.
+
+FLEXURES = "flexures.csv"
+FLEXURE_COLUMNS = (
+    "flexure",
+    "frames",
+    "thickness_mm",
+    "u_thickness_mm",
+    "along_mm",
+    "u_along_mm",
+    "across_mm",
+    "u_across_mm",
+)
+
+
+def write_flexures(path: Path, outlines: Sequence[FlexureOutline]) -> None:
+    """Write flexures.csv; an empty cell represents a missing value."""
+    rows = []
+    for one in outlines:
+        pairs = (one.thickness_mm, one.along_mm or ("", ""), one.across_mm)
+        cells = [f"{value:.6f}" if value != "" else "" for pair in pairs for value in pair]
+        rows.append([one.flexure, one.frames, *cells])
+    write_table(path, FLEXURE_COLUMNS, rows)
+
+
+def flexures_beside(table: Path) -> dict[str, FlexureOutline]:
+    """Read the flexures.csv beside a measured table, by the flexure's name; empty if there is none.
+
+    Raises
+    ------
+    DataError
+        The file is not a flexures.csv.
+    """
+    path = table.parent / FLEXURES
+    if not path.is_file():
+        return {}
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return {row["flexure"]: _outline(row) for row in csv.DictReader(file)}
+    except (KeyError, TypeError, ValueError, UnicodeDecodeError) as error:
+        raise DataError(
+            f"{path} must have the columns {','.join(FLEXURE_COLUMNS)} with numbers, but has not: measure the "
+            "recording again, or remove the file."
+        ) from error
+
+
+def _outline(row: dict[str, str]) -> FlexureOutline:
+    def pair(name: str) -> tuple[float, float]:
+        return float(row[f"{name}_mm"]), float(row[f"u_{name}_mm"])
+
+    along = pair("along") if row["along_mm"] else None
+    return FlexureOutline(row["flexure"], int(row["frames"]), pair("thickness"), along, pair("across"))

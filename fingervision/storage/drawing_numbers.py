@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any
 
 from fingervision.domain.errors import DataError
-from fingervision.storage.number_columns import is_number
+from fingervision.storage.csv_columns import is_number
 
 Path = tuple[str | int, ...]
 

@@ -1,14 +1,23 @@
-"""The file drive.csv: the recorded input over time, `time_s,input_mm[,run][,force_n]`."""
+"""The recorded input over time: the file drive.csv, and samples.csv of a run on the test bed."""
 
+import csv
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, make_dataclass
+from functools import cache
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError
+from fingervision.domain.field import Field, names_of
+from fingervision.domain.status import Status
 from fingervision.storage.csv_columns import read_columns
+from fingervision.storage.durable import replaced
+from fingervision.storage.plain_file import plain
+from fingervision.storage.row_file import RowFile, line_of, row_of
 
 COLUMNS = ("time_s", "input_mm", "force_n")
 
@@ -72,3 +81,99 @@ def drive_rows(
                     f"{path}."
                 )
     return DriveHistory(times, values["input_mm"], runs, values.get("force_n"))
+
+
+# The file samples.csv of a run on the test bed: a measured table with additional columns.
+
+# Decimal places: a microsecond, a tenth of a nanometre and a micronewton are below any uncertainty.
+TIME_PLACES, MM_PLACES, FORCE_PLACES = 6, 7, 6
+
+
+@dataclass(frozen=True, slots=True)
+class SampleRow:
+    """One row of samples.csv; None is written as an empty cell."""
+
+    run: Annotated[str, Field("name of the run; a re-zeroing, or any other loss of continuity, begins a new run")]
+    time_s: Annotated[float, Field("time since the first row, by the camera's clock", "s", TIME_PLACES)]
+    input_mm: Annotated[
+        float | None,
+        Field(
+            "position of the stage at the time of the exposure, interpolated between the readings of its encoder",
+            "mm",
+            MM_PLACES,
+        ),
+    ]
+    gap_mm: Annotated[float | None, Field("gap", "mm", MM_PLACES)]
+    left_mm: Annotated[float | None, Field("positions of the measuring points", "mm", MM_PLACES)]
+    right_mm: Annotated[float | None, Field("positions of the measuring points", "mm", MM_PLACES)]
+    u_gap_mm: Annotated[
+        float | None, Field("standard uncertainty of `gap_mm`, with the whole budget", "mm", MM_PLACES, low=0.0)
+    ]
+    u_random_mm: Annotated[float | None, Field("random part of `u_gap_mm`", "mm", MM_PLACES, low=0.0)]
+    force_n: Annotated[float | None, Field("force at the drive at the time of the exposure", "N", FORCE_PLACES)]
+    status: Annotated[Status, Field("as in gaps.csv")]
+    frame: Annotated[int, Field("number of the frame in the video, from 0")]
+    step: Annotated[int, Field("number of the recipe's step, from 1")]
+    encoder_mm: Annotated[
+        float | None, Field("most recent position reading of the actuator when the frame arrived", "mm", MM_PLACES)
+    ]
+    camera_s: Annotated[float, Field("time stamp of the frame by the camera's clock", "s", TIME_PLACES)]
+    arrived_s: Annotated[float, Field("time of its arrival by the test bed's clock", "s", TIME_PLACES)]
+
+
+SAMPLE_COLUMNS = ",".join(names_of(SampleRow))
+
+
+@cache
+def row_with(channels: tuple[str, ...]) -> type[SampleRow]:
+    """The record of a row with further columns, one for each channel of the test bed, by their names."""
+    value = Annotated[float | None, Field("value of a channel at the time of the exposure")]
+    more = [(name, value, field(default=None)) for name in channels]
+    return make_dataclass("SampleRow", more, bases=(SampleRow,), frozen=True, slots=True) if channels else SampleRow
+
+
+class SamplesCsv(RowFile[SampleRow]):
+    """Writes samples.csv row by row, with a column for each channel; `go_on` appends to an existing file."""
+
+    def __init__(self, path: Path, channels: tuple[str, ...] = (), *, go_on: bool = False) -> None:
+        super().__init__(path, row_with(channels), go_on=go_on)
+
+
+def read_samples(path: Path) -> list[SampleRow]:
+    """Read the complete rows of an interrupted run, and remove an incomplete last row from the file.
+
+    Raises
+    ------
+    DataError
+        The file is not the table of a run on the test bed.
+    """
+    try:
+        text = plain(path).read_bytes()
+        whole = text[: text.rfind(b"\n") + 1]
+        lines = whole.decode("utf-8").splitlines()
+        columns = lines[0] if lines else SAMPLE_COLUMNS
+        ours, names = f"{columns},".startswith(f"{SAMPLE_COLUMNS},"), columns.split(",")
+        record = row_with(tuple(names[len(SAMPLE_COLUMNS.split(",")) :])) if ours else SampleRow
+        rows = [row_of(record, names, cells) for cells in csv.reader(lines[1:])] if ours else []
+        if len(whole) < len(text):
+            with path.open("rb+") as file:
+                file.truncate(len(whole))
+    except FileNotFoundError:
+        return []
+    except (OSError, ValueError, TypeError) as error:
+        raise DataError(
+            f"{path} must be the table of samples of the interrupted run, but cannot be read as one ({error}): name "
+            "another folder with --out."
+        ) from error
+    if not ours:
+        raise DataError(f"{path} must be the table of a run on the test bed, but has another header.")
+    return rows
+
+
+def write_rows(path: Path, rows: Sequence[SampleRow]) -> None:
+    """Replace the table by the given rows; the file on disk is complete at any time."""
+    record: Any = type(rows[-1]) if rows else SampleRow
+    names = names_of(record)
+    alike = (record(**{name: getattr(row, name, None) for name in names}) for row in rows)
+    with replaced(path) as part:
+        part.write_text("\n".join((",".join(names), *map(line_of, alike))) + "\n", encoding="utf-8")

@@ -12,9 +12,8 @@ from fingervision.domain.field import declared
 from fingervision.domain.measured_table import Channel, MeasuredTable, RecordedPath
 from fingervision.motion.time_stamps import frame_resolution_s
 from fingervision.storage.beside import measurement_beside, response_note_beside, slots_beside, u_clock_beside
-from fingervision.storage.csv_columns import read_columns
+from fingervision.storage.csv_columns import Numbers, read_columns
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.storage.number_columns import Numbers
 
 UNITS = ("_mm", "_mrad")
 U_PREFIXES = ("u_random_", "u_")

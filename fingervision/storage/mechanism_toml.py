@@ -15,8 +15,7 @@ from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check
 from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box, crosses_itself
 from fingervision.models.strips import strips_of
 from fingervision.storage.drawing_numbers import bare_tables, changed_tables, number, numbers_of
-from fingervision.storage.gripper_template import mechanism_from_gripper
-from fingervision.storage.gripper_toml import check_material, read_material
+from fingervision.storage.gripper_toml import check_material, mechanism_from_gripper, read_material
 from fingervision.storage.plain_file import toml_of
 from fingervision.storage.toml_section import DRAWINGS, Section, read_document, refuse_other_file
 

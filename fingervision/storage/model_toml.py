@@ -14,18 +14,16 @@ from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue, origin_of
 from fingervision.effects.position_error_map import curve_points, curve_values
 from fingervision.models.corrected import CorrectedModel
-from fingervision.models.drawn_mechanism import MechanismModelOfGap
 from fingervision.models.function_model import SUFFIXES, FunctionModel
 from fingervision.models.kinds import kinds
-from fingervision.models.physical_gripper import PhysicalGripper
+from fingervision.models.physical_gripper import MechanismModelOfGap, PhysicalGripper
 from fingervision.models.table import TableModel
 from fingervision.plugins.origin import SESSION
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import is_mechanism, read_mechanism
-from fingervision.storage.plain_file import in_utf8
+from fingervision.storage.plain_file import in_utf8, toml_lines
 from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.storage.toml_section import Section, read_section
-from fingervision.storage.toml_text import toml_lines
 
 FMU_KEYS = ("input", "gap", "input_unit", "gap_unit")
 """Keys of an FMU: names of its input and gap, and their units where the FMU declares none."""

@@ -11,7 +11,7 @@ from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.missing_references import OWN_RECORDING
 from fingervision.frames.open_container import open_container
-from fingervision.frames.received import OwnPacket
+from fingervision.frames.source import OwnPacket
 from fingervision.storage.durable import Flushing, flush
 from fingervision.vision.grey import to_grey
 

@@ -9,9 +9,8 @@ from typing import Annotated, Any
 from fingervision.domain.direction import Direction
 from fingervision.domain.field import Field, names_of
 from fingervision.storage.durable import written
-from fingervision.storage.plain_file import in_utf8
+from fingervision.storage.plain_file import in_utf8, toml_lines
 from fingervision.storage.toml_section import read_section
-from fingervision.storage.toml_text import toml_lines
 
 TIPS = ("auto", *(direction.value for direction in Direction))
 POLARITIES = ("auto", "dark", "light")

@@ -11,8 +11,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError
 from fingervision.domain.response import Response
 from fingervision.models.table import TableModel
-from fingervision.storage.csv_columns import read_columns
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.csv_columns import Numbers, read_columns
 from fingervision.storage.row_file import write_table
 
 COLUMNS = ("input_mm", "gap_mm", "left_mm", "right_mm", "force_n")

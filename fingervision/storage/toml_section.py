@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar, get_args, get_origin
 
 from fingervision.domain.errors import DataError, InputFileError
 from fingervision.domain.field import Declared, Field, declared
+from fingervision.storage.csv_columns import is_number
 from fingervision.storage.drawing_numbers import number
-from fingervision.storage.number_columns import is_number
 from fingervision.storage.plain_file import NotUtf8Error, parsed, text_of
 
 # Table or key that only this kind of file has, whether it is a list of tables, and the option that takes the file.

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels
 from fingervision.tables.column_choice import CANONICAL, NEEDED
-from fingervision.tables.column_names import DIMENSION, column_name
 from fingervision.tables.formats import read_raw
 from fingervision.tables.iso230 import iso230_rows_of
 from fingervision.tables.mapping import KINDS, Entry
@@ -22,6 +21,7 @@ from fingervision.tables.raw_table import RawTable
 from fingervision.tables.read import drive_of, read_drive, read_measured_table, read_simulation_table
 from fingervision.tables.understanding import Taken, Understood, understand
 from fingervision.tables.units import CANONICAL as CANONICAL_UNIT
+from fingervision.tables.units import DIMENSION, column_name
 
 RANGE_UNIT = {role: CANONICAL_UNIT[dimension] for role, dimension in DIMENSION.items()}
 """Unit in which the range of a column is stated: the unit after conversion, not that of the file."""

@@ -5,12 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fingervision.storage.csv_columns import Numbers
 from fingervision.storage.measured_table import NO_CHANNELS
-from fingervision.storage.number_columns import Numbers
-from fingervision.tables.cells import to_numbers
-from fingervision.tables.column_names import BESIDE, BRACKETS, column_name
+from fingervision.tables.dialect import to_numbers
 from fingervision.tables.raw_table import RawColumn, RawTable
-from fingervision.tables.units import factor, known_unit, spelled
+from fingervision.tables.units import BESIDE, BRACKETS, column_name, factor, known_unit, spelled
 
 MRAD = {
     **dict.fromkeys(("mrad", "milliradian", "milliradians"), 1.0),

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fingervision.domain.errors import DataError
-from fingervision.storage.number_columns import Numbers
-from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
+from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.column_suggestions import (
     SAME_MOTION,
     SURE,
@@ -21,7 +20,7 @@ from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import Question, Reading, asked
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import looks_like_time
-from fingervision.tables.units import factor, spelled
+from fingervision.tables.units import DIMENSION, ColumnName, column_name, factor, spelled
 from fingervision.tables.words import tokens
 
 NEEDED = {"measured": ("input", "gap"), "drive": ("time", "input"), "simulation": ("input", "gap")}

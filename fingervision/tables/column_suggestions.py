@@ -5,13 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.storage.number_columns import Numbers
-from fingervision.tables.cells import to_numbers
-from fingervision.tables.column_names import DIMENSION, ColumnName
+from fingervision.storage.csv_columns import Numbers
+from fingervision.tables.dialect import to_numbers
 from fingervision.tables.questions import span
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import looks_like_time
-from fingervision.tables.units import CANONICAL, factor, known_unit, spelled
+from fingervision.tables.units import CANONICAL, DIMENSION, ColumnName, factor, known_unit, spelled
 from fingervision.tables.words import mentions, tokens
 
 LOOKED_AT = 200

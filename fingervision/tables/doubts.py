@@ -11,7 +11,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import Question, Reading, asked, span
 from fingervision.tables.times import clock_leaps, counts_days, is_epoch, is_known_leap, usual_step, without_leaps

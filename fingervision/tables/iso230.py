@@ -15,15 +15,14 @@ import numpy as np
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
+from fingervision.storage.csv_columns import Numbers
 from fingervision.storage.measured_table import measured_rows
-from fingervision.storage.number_columns import Numbers
-from fingervision.tables.cells import to_numbers
-from fingervision.tables.column_names import ColumnName, column_name
+from fingervision.tables.dialect import to_numbers
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
 from fingervision.tables.raw_table import RawTable
 from fingervision.tables.times import looks_like_time, seconds_of
-from fingervision.tables.units import factor
+from fingervision.tables.units import ColumnName, column_name, factor
 from fingervision.tables.words import FILLERS, tokens
 
 KIND = "measured"

@@ -10,9 +10,8 @@ from typing import Any
 
 from fingervision.domain.errors import DataError
 from fingervision.storage.durable import written
-from fingervision.storage.plain_file import in_utf8
+from fingervision.storage.plain_file import in_utf8, toml_lines
 from fingervision.storage.toml_section import Section, read_document, read_section
-from fingervision.storage.toml_text import toml_lines
 
 NAME = "columns.toml"
 KINDS = ("measured", "drive", "simulation")

@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from fingervision.domain.errors import DataError
-from fingervision.tables.column_names import column_name
 from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import OpenQuestionError, Question
+from fingervision.tables.units import column_name
 
 
 def chosen_part(path: Path, names: Mapping[str, Sequence[str]], given: Entry, what: str) -> str:

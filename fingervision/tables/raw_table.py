@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.csv_columns import Numbers
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
 from fingervision.storage import drive_csv, measured_table, model_toml, simulation_table
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.column_choice import CANONICAL
 from fingervision.tables.formats import read_raw
 from fingervision.tables.iso230 import iso230_rows_of

@@ -9,9 +9,7 @@ import numpy as np
 
 from fingervision.domain.errors import DataError
 from fingervision.domain.numbers import MINUS
-from fingervision.storage.number_columns import Numbers, number_block
-from fingervision.tables.cells import which_mark
-from fingervision.tables.column_names import column_name
+from fingervision.storage.csv_columns import Numbers, number_block
 from fingervision.tables.dialect import (
     BY_NAME,
     SAMPLE_LINES,
@@ -21,14 +19,24 @@ from fingervision.tables.dialect import (
     is_number,
     is_value,
     split,
+    which_mark,
 )
 from fingervision.tables.mapping import Entry
-from fingervision.tables.other_rows import is_other_header, other_header, statistics_below
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
-from fingervision.tables.text_header import HEADER_LINES, Header, find_header, first_row, header_below_values, names_in
+from fingervision.tables.text_header import (
+    HEADER_LINES,
+    Header,
+    find_header,
+    first_row,
+    header_below_values,
+    is_other_header,
+    names_in,
+    other_header,
+    statistics_below,
+)
 from fingervision.tables.times import looks_like_time
-from fingervision.tables.units import known_unit
+from fingervision.tables.units import column_name, known_unit
 from fingervision.tables.words import role_of
 
 # Text logs in which each number has its name before it: `t=0.100 x=0.61 gap=4.2`, as microcontrollers print.

@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels, channels_in
-from fingervision.tables.cells import to_numbers
 from fingervision.tables.column_choice import NEEDED, Findings, choose
-from fingervision.tables.column_names import DIMENSION, ColumnName, column_name
-from fingervision.tables.dialect import MISSING, NO_NUMBER
+from fingervision.tables.dialect import MISSING, NO_NUMBER, to_numbers
 from fingervision.tables.doubts import (
     doubts,
     dropped_out,
@@ -28,7 +26,7 @@ from fingervision.tables.own_format import refuse_long_table
 from fingervision.tables.questions import OpenQuestionError, Question, Reading, asked, span
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import clock_leaps, is_day_number, is_epoch, looks_like_time, seconds_of, without_leaps
-from fingervision.tables.units import factor, known_unit, spelled
+from fingervision.tables.units import DIMENSION, ColumnName, column_name, factor, known_unit, spelled
 
 # Read cells that contain a number and its unit, such as the durations of MATLAB's timetables (`0.1 sec`).
 

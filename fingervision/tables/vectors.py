@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.raw_table import RawColumn
 
 WIDEST = 200

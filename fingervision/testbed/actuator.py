@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from fingervision.testbed.reading import Reading
+from fingervision.testbed.force_sensor import Reading
 
 
 @dataclass(frozen=True, slots=True)

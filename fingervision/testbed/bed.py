@@ -10,7 +10,7 @@ from fingervision.testbed.actuator import Actuator
 from fingervision.testbed.camera import BedCamera
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import ForceSensor
-from fingervision.testbed.motion.soft_limits import SoftLimits
+from fingervision.testbed.motion.move_limits import SoftLimits
 from fingervision.testbed.operator import Operator
 from fingervision.testbed.text_protocol.sensor import TextSensor
 

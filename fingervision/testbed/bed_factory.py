@@ -11,12 +11,12 @@ from calib.calibration import BareScale
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.model import Model
 from fingervision.measuring.scale import Scale
+from fingervision.models.answer_figures import Physics
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model, kinds
-from fingervision.models.physics import Physics
 from fingervision.storage.calibration_json import read_calibration
+from fingervision.storage.drive_csv import SAMPLE_COLUMNS
 from fingervision.storage.gripper_toml import read_gripper
-from fingervision.storage.samples_csv import COLUMNS
 from fingervision.storage.toml_section import Section, read_document
 from fingervision.tables.read import read_simulation_table
 from fingervision.testbed.actuator import Actuator, StageLimits
@@ -26,12 +26,11 @@ from fingervision.testbed.camera import BedCamera
 from fingervision.testbed.clocks.clock import Clock, HostClock, VirtualClock
 from fingervision.testbed.device_kinds import Kind, kind_of
 from fingervision.testbed.force_sensor import ForceSensor
-from fingervision.testbed.motion.soft_limits import SoftLimits
+from fingervision.testbed.motion.move_limits import SoftLimits
 from fingervision.testbed.operator import Operator, operator_of
-from fingervision.testbed.simulation.gripper import SimulatedGripper
+from fingervision.testbed.simulation.gripper import SimulatedGripper, sample_gripper
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 from fingervision.testbed.simulation.recording_actuator import Followed
-from fingervision.testbed.simulation.sample_gripper import sample_gripper
 from fingervision.testbed.text_protocol import sensor
 from fingervision.testbed.text_protocol.sensor import TextSensor, opened_sensor
 
@@ -161,7 +160,7 @@ def channel_name(section: Section, known: Collection[str]) -> str:
     section.only(("name", "kind", *sensor.KEYS))
     section.word("kind", "serial_text", of=("serial_text",))
     name = section.word("name")
-    if not NAME.fullmatch(name) or name in (*COLUMNS.split(","), *known):
+    if not NAME.fullmatch(name) or name in (*SAMPLE_COLUMNS.split(","), *known):
         section.refuse("name", f"must be letters, digits and _, and no other column's name, but is {name!r}.")
     return name
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from fingervision.measuring.scale import Scale
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion.soft_limits import SoftLimits
+from fingervision.testbed.motion.move_limits import SoftLimits
 from fingervision.testbed.simulation.gripper import Motion, SimulatedGripper
 from fingervision.testbed.simulation.injected_effects import Hidden
 

@@ -7,17 +7,15 @@ from contextlib import suppress
 from typing import Any, Generic, NoReturn, Protocol, cast
 
 from fingervision.domain.errors import FingervisionError
-from fingervision.plugins.entry import Entry
 from fingervision.plugins.faults import MisfitError, PluginShapeError
-from fingervision.plugins.origin import Origin, of_file
+from fingervision.plugins.origin import Entry, Origin, of_file
 from fingervision.plugins.registry import Registry
 from fingervision.storage.toml_section import Section
 from fingervision.testbed import actuators, cameras, force_sensors
 from fingervision.testbed.actuator import Actuator, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.camera import BedCamera
-from fingervision.testbed.force_sensor import ForceSensor
-from fingervision.testbed.reading import Reading
+from fingervision.testbed.force_sensor import ForceSensor, Reading
 
 
 def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) -> Any:

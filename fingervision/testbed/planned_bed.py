@@ -16,7 +16,7 @@ from fingervision.testbed.bed_factory import (
     stated_scale,
 )
 from fingervision.testbed.device_kinds import PluggedKind, kind_of
-from fingervision.testbed.motion.soft_limits import SoftLimits
+from fingervision.testbed.motion.move_limits import SoftLimits
 
 CAMERA_PX, CAMERA_HZ = (640, 480), 25.0
 """Size and frame rate of a camera whose section states none: those of the published test bed."""

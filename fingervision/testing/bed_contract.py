@@ -11,7 +11,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.testbed import bed_factory
 from fingervision.testbed.bed import Bed
-from fingervision.testbed.reading import Reading
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testing.contract import NotApplicable, hold
 
 WAIT_S, PATIENCE_S = 0.01, 10.0

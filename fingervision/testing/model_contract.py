@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from fingervision.models.answer_figures import LINEAR
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import GripperModel, Kind
-from fingervision.models.physics import LINEAR
-from fingervision.testbed.simulation.sample_gripper import sample_gripper
+from fingervision.testbed.simulation.gripper import sample_gripper
 from fingervision.testing.contract import hold
 
 RELATIVE = 1e-6

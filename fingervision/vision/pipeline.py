@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from calib.camera_response import CameraResponse
 from fingervision.domain.camera import CameraModel, Origin
 from fingervision.domain.errors import DataError
-from fingervision.domain.frame import Frame, Pixels
+from fingervision.domain.frame import Frame, Pixels, Region
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges, local_change

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from calib.camera_response import CameraResponse, standard_response
 from fingervision.domain.camera import ASSUMED_CAMERA, CameraModel, stated_camera
 from fingervision.domain.direction import Direction
-from fingervision.domain.region import Region
+from fingervision.domain.frame import Region
 
 # A camera that is known to be linear.
 LINEAR_CAMERA = stated_camera(standard_response("linear"))

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.batch.overview import table_text
-from fingervision.batch.reduction import reduction_of
+from fingervision.batch.overview import reduction_of, table_text
 from fingervision.batch.task import Digest, Outcome
 
 COLUMN = reduction_of("measure").COLUMNS[0]

@@ -22,10 +22,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from fingervision.batch.fingerprint import content_hash, stamp_of
 from fingervision.batch.result_folder import Record, write_record
 from fingervision.batch.run import MARK
 from fingervision.batch.task import CURVE_POINTS, Digest
+from fingervision.batch.work import content_hash, stamp_of
 from fingervision.domain.frame import Frame
 from fingervision.rendering import Camera, render, two_fingers
 from tests.benchmarks.frame import Namespace, benchmark, told

@@ -25,11 +25,9 @@ from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.measuring.gap_budget import bias_shares
-from fingervision.rendering.camera import Camera
-from fingervision.rendering.lens import RadialLens, Tilt
-from fingervision.rendering.light import Light
+from fingervision.rendering.camera import Camera, RadialLens, Tilt
 from fingervision.rendering.picture import render
-from fingervision.rendering.scene import Patch, Scene
+from fingervision.rendering.scene import Light, Patch, Scene
 from fingervision.rendering.targets import bar, slot
 from fingervision.rendering.two_fingers import two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame

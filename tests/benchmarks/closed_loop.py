@@ -14,12 +14,11 @@ from fingervision.effects import catalogue
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from fingervision.storage.recipe_toml import read_recipe, write_recipe
-from fingervision.storage.report_json import report_document
+from fingervision.storage.summary_json import report_document
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testbed.run.run_folder import SAMPLES, SIMULATION
-from fingervision.testbed.simulation.injected_effects import Hidden
-from fingervision.testbed.simulation.parse_injected_effects import usual_values
+from fingervision.testbed.simulation.injected_effects import Hidden, usual_values
 from tests.benchmarks.frame import Namespace, benchmark
 
 NAMED = (

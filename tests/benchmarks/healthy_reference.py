@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 
 from calib.calibration import BareScale
 from fingervision.diagnosis.bodies.healthy_reference import HealthyReference, Recording, WhatChanged
-from fingervision.domain.flexure_outline import FlexureOutline
+from fingervision.domain.body_poses import FlexureOutline
 from fingervision.domain.frame import Frame
 from fingervision.measuring.body_poses import BodyTracker
 from fingervision.measuring.drawing_placement import GivenPoint

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import splu
 from skfem.helpers import ddot, eye, sym_grad, trace
 
 from fingervision.domain.gripper import Material
-from fingervision.models.notch import Notch
+from fingervision.models.hinge_correction import Notch
 from fingervision.models.width_effect import held_moduli
 
 Array = NDArray[np.float64]

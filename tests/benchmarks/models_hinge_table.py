@@ -3,7 +3,7 @@
 import numpy as np
 
 from fingervision.domain.gripper import Material
-from fingervision.models.notch import bar_compliance, beam_compliance, circular_notch
+from fingervision.models.hinge_correction import bar_compliance, beam_compliance, circular_notch
 from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
+from fingervision.models.answer_figures import Physics
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.motion_in_time import gripper_motion
 from fingervision.models.parameter_sweep import parse_variation, sweep_answers
-from fingervision.models.physics import Physics
 from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.storage.gripper_toml import read_gripper
 from tests.benchmarks.frame import Namespace, benchmark, processor_s

@@ -22,8 +22,7 @@ from fingervision.storage.board_toml import read_board
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.model_toml import read_model
-from fingervision.storage.recipe_toml import read_recipe
-from fingervision.storage.steps_toml import read_steps
+from fingervision.storage.recipe_toml import read_recipe, read_steps
 from fingervision.storage.toml_section import Section
 from tests.benchmarks.frame import Namespace, benchmark
 

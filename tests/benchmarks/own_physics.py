@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.report import DiagnosisReport
+from fingervision.models.answer_figures import LINEAR, Physics
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.physics import LINEAR, Physics
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model

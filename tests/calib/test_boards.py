@@ -12,11 +12,9 @@ from calib.errors import CalibrationError
 from calib.limits import Limits
 from calib.projection import Lens
 from calib.scale_from_board import scale_from_board
-from fingervision.rendering.camera import Camera
-from fingervision.rendering.lens import RadialLens, Tilt
-from fingervision.rendering.light import Light
+from fingervision.rendering.camera import Camera, RadialLens, Tilt
 from fingervision.rendering.picture import render
-from fingervision.rendering.scene import Patch, Scene
+from fingervision.rendering.scene import Light, Patch, Scene
 from fingervision.rendering.targets import chessboard
 
 REAL = Path(__file__).parents[3] / "shared" / "real" / "chessboard"

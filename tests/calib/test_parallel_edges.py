@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from calib.straight_edges import find_edge_pairs
 from fingervision.rendering.camera import Camera
-from fingervision.rendering.light import Light
 from fingervision.rendering.picture import render
-from fingervision.rendering.scene import Patch, Scene
+from fingervision.rendering.scene import Light, Patch, Scene
 from fingervision.rendering.targets import bar, disc, slot
 
 REAL = Path(__file__).parents[3] / "shared" / "real"

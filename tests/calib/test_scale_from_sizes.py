@@ -7,11 +7,9 @@ from calib.known_widths import KnownSize, find_widths
 from calib.limits import Limits, rectangular
 from calib.measured_scale import Reference
 from calib.scale_from_sizes import MeasuredSize, ScaleFit, scale_from_sizes
-from fingervision.rendering.camera import Camera
-from fingervision.rendering.lens import RadialLens
-from fingervision.rendering.light import Light
+from fingervision.rendering.camera import Camera, RadialLens
 from fingervision.rendering.picture import render
-from fingervision.rendering.scene import Patch, Scene
+from fingervision.rendering.scene import Light, Patch, Scene
 from fingervision.rendering.targets import bar, slot
 
 TRUE_SCALE, FRAME = 34.0, (640, 480)

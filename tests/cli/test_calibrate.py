@@ -15,9 +15,8 @@ from calib.limits import Limits
 from fingervision.cli.calibrate import LIMITS, command
 from fingervision.domain.errors import FingervisionError
 from fingervision.rendering.camera import Camera
-from fingervision.rendering.light import Light
 from fingervision.rendering.picture import render
-from fingervision.rendering.scene import Patch, Scene
+from fingervision.rendering.scene import Light, Patch, Scene
 from fingervision.rendering.targets import bar, chessboard
 from fingervision.storage.calibration_json import read_calibration
 

@@ -9,10 +9,10 @@ from click.testing import CliRunner
 
 from fingervision.cli.model import command
 from fingervision.domain.errors import FingervisionError, InputFileError, OutputError, UsageError
+from fingervision.models.answer_figures import Physics
 from fingervision.models.grip import Part, first_grip_mm
 from fingervision.models.kinds import kinds
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.physics import Physics
 from fingervision.storage.gripper_toml import read_gripper
 
 NOTCH = 0.02
@@ -196,7 +196,7 @@ def test_modes_are_written_and_drawn(tmp_path: Path) -> None:
     run(GRIPPER, "--modes", "2", "--drive", given, "--out", tmp_path)
     with (tmp_path / "modes.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * 3 * 2
+    assert len(rows) == 3 * 3 * 2
     found = {(row["kind"], row["family"], row["number"]): float(row["frequency_hz"]) for row in rows}
     # Plane stress has 44.6 and 357.9 Hz; the width of the hinges adds half its 2.6 % of force to the first.
     assert found["finite_element", "drive free", "1"] == pytest.approx(44.6 * 1.013, rel=0.005)

@@ -12,11 +12,11 @@ from fingervision.cli.diagnose import command
 from fingervision.diagnosis.bodies.body_evidence import drawing_of
 from fingervision.diagnosis.bodies.healthy_reference import HealthyReference, Recording
 from fingervision.diagnosis.bodies.reference_report import Compared, change_words, drawing_svg, gap_changes
+from fingervision.domain.body_poses import FlexureOutline
 from fingervision.domain.errors import DataError
-from fingervision.domain.flexure_outline import FlexureOutline
 from fingervision.models.mechanism_bodies import column_name
 from fingervision.models.place_answers import PARTS, PlaceAnswers, PlaceChanges
-from fingervision.storage.flexures_csv import flexures_beside, write_flexures
+from fingervision.storage.bodies_csv import flexures_beside, write_flexures
 from fingervision.storage.mechanism_toml import read_mechanism
 from fingervision.storage.model_toml import read_model
 from tests.benchmarks.healthy_reference import DRAWINGS, Plant, changed, filmed, inputs_of

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
-from fingervision.domain.measured_table import MeasuredTable
-from fingervision.domain.reference_slot import ReferenceSlot
+from fingervision.domain.measured_table import MeasuredTable, ReferenceSlot
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.models.corrected import CorrectedModel
 from fingervision.storage.measured_table import read_measured_table

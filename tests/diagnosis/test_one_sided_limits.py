@@ -13,7 +13,7 @@ from fingervision.domain.parameter import Estimate, Parameter
 from fingervision.domain.report import NamedEffect
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
-from fingervision.storage.report_json import report_document
+from fingervision.storage.summary_json import report_document
 
 AMPLITUDE = Parameter("amplitude_mm", "mm", -2.0, 2.0, "final thermal change")
 TAU = Parameter("tau_s", "s", 2.0, 3000.0, "thermal time constant", neutral=None)

@@ -12,7 +12,7 @@ from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.report import DiagnosisReport
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
-from fingervision.storage.report_json import report_document
+from fingervision.storage.summary_json import report_document
 
 EDGE_MM = 0.004
 SEED = 5

@@ -29,7 +29,7 @@ def keys_in(*paths: str) -> set[str]:
     [
         ("status", {str(status) for status in Status}),
         ("response.csv", set(response_csv.COLUMNS)),
-        ("report.json", keys_in("fingervision/storage/report_json.py")),
+        ("report.json", keys_in("fingervision/storage/summary_json.py")),
         ("calibration.json", keys_in("fingervision/storage/calibration_json.py") - {"tilt", "value", "stated"}),
     ],
 )

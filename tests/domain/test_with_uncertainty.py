@@ -2,7 +2,7 @@
 
 import pytest
 
-from fingervision.domain.with_uncertainty import with_uncertainty
+from fingervision.domain.numbers import with_uncertainty
 
 
 @pytest.mark.parametrize(

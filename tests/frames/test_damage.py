@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames.damage import EvenRow, believable
 from fingervision.frames.file_pictures import AviPlaces
 from fingervision.frames.source import open_source
-from fingervision.frames.told_times import EvenRow, believable
 from tests import clips
 
 RATE_HZ, COUNT, SIZE_PX = 25, 60, (96, 64)

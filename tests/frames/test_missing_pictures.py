@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
-from fingervision.frames.luma import luma
+from fingervision.frames.decoded_picture import luma
 from fingervision.frames.source import open_source
 from tests import clips
 

@@ -3,7 +3,7 @@
 import av
 
 from fingervision.frames.network_stream import _until_shown
-from fingervision.frames.received import OwnPacket
+from fingervision.frames.source import OwnPacket
 
 
 def own(pts: int | None) -> OwnPacket:

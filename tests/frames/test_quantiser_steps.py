@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from fingervision.domain.frame import Frame
 from fingervision.domain.quantiser import BLOCK_PX, Quantiser
-from fingervision.frames import quantiser_steps
-from fingervision.frames.quantiser_steps import FADES, H264, VP9, VP9_STEPS, StatedSteps, StepTrail
+from fingervision.frames import decoded_picture
+from fingervision.frames.decoded_picture import FADES, H264, VP9, VP9_STEPS, StatedSteps, StepTrail
 from fingervision.frames.seeking import seeking
 from fingervision.frames.source import open_source
 from tests.frames.test_rotation import turn
@@ -146,7 +146,7 @@ def test_a_block_that_is_copied_keeps_the_step_that_coded_it(
     """
     stated = iter(STATED)
     monkeypatch.setattr(
-        quantiser_steps,
+        decoded_picture,
         "stated_steps",
         lambda _: StatedSteps(Quantiser(np.array([next(stated)], dtype=np.float32)), kind),
     )

@@ -11,7 +11,7 @@ import pytest
 from calib.calibration import BareScale
 from fingervision.domain.errors import FingervisionError, StateError, UsageError
 from fingervision.domain.status import Status
-from fingervision.frames.received import Received
+from fingervision.frames.source import Received
 from fingervision.live.bed.bench import Bench
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices

@@ -17,8 +17,7 @@ from calib.calibration import BareScale
 from fingervision.domain.errors import DeviceError, FingervisionError, StateError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.frames.controls import CameraControl, adjust, controls_of
-from fingervision.frames.received import Received
-from fingervision.frames.source import Description
+from fingervision.frames.source import Description, Received
 from fingervision.live.capture import Adjustments, Capture
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey, section

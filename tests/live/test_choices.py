@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from calib.calibration import BareScale
 from fingervision.domain.errors import UsageError
-from fingervision.domain.region import Region
+from fingervision.domain.frame import Region
 from fingervision.frames.simulated import SimulatedGripper
 from fingervision.live.choices import Choices
 

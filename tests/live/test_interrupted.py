@@ -19,8 +19,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Coding, Frame
 from fingervision.frames import camera
 from fingervision.frames.camera_settings import V4L2
-from fingervision.frames.received import Received
-from fingervision.frames.source import Description, Wish, open_source
+from fingervision.frames.source import Description, Received, Wish, open_source
 from fingervision.live import capture as capture_module
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices

@@ -16,9 +16,8 @@ from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ExitCode, OutputError, UsageError
-from fingervision.domain.frame import Coding, Frame, LostFrame
+from fingervision.domain.frame import Coding, Frame, LostFrame, Region
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.frames.arrays import ArrayFrames
 from fingervision.frames.source import Description

@@ -8,7 +8,7 @@ from math import atan, pi, sqrt
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.gripper import Material
-from fingervision.models.notch import Notch
+from fingervision.models.hinge_correction import Notch
 
 
 def paros_weisbord_bending(notch: Notch, material: Material) -> float:

@@ -7,13 +7,13 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli.model import command
+from fingervision.models.answer_figures import LINEAR
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_mechanism import whole_mechanism
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model, kinds
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_bodies import bodies_of, column_name, rigid_motion
-from fingervision.models.physics import LINEAR
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import mechanism_from_tables, read_mechanism
 

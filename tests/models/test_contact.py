@@ -8,9 +8,9 @@ from scipy.sparse.linalg import spsolve
 from skfem.helpers import ddot, eye, grad, mul, trace, transpose
 
 from fingervision.domain.gripper import Gripper
+from fingervision.models.answer_figures import Physics
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.physics import Physics
 from fingervision.models.reference_mesh import ElementSize, mesh_outline
 
 PENALTY_N_MM = 1e6

@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingervision.domain.gripper import Material
-from fingervision.models.hinge_correction import planes_ratio
-from fingervision.models.notch import Notch, beam_compliance, circular_notch, masses_t
+from fingervision.models.hinge_correction import Notch, beam_compliance, circular_notch, masses_t, planes_ratio
 from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 from tests.models import hinge_closed_forms as closed
 

@@ -8,9 +8,8 @@ from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.flexure_span import FlexureSpan
 from fingervision.models.flexure_stress import nominal_stress
 from fingervision.models.gripper_mechanism import half_mechanism, redrawn
-from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.hinge_correction import HingeTheory, notches_of
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.notch import notches_of
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 NOTCH = 0.02

@@ -7,9 +7,9 @@ import pytest
 from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import Model
+from fingervision.models.answer_figures import LINEAR
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import REGISTRY, build_model, kinds
-from fingervision.models.physics import LINEAR
 from fingervision.testing import ModelContract, NotApplicable, checks_of
 
 

@@ -13,12 +13,12 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
+from fingervision.models.answer_figures import Physics
 from fingervision.models.gripper_mechanism import redrawn
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import kinds
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.physical_gripper import PhysicalGripper
-from fingervision.models.physics import Physics
 from fingervision.models.small_answer import ratio_curves, small_answer
 from tests.benchmarks.own_physics import longer_lever
 

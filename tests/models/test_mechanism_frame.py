@@ -10,13 +10,13 @@ import pytest
 
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.answer_figures import Physics
 from fingervision.models.corotational_frame import CorotationalBody, turned_axes
 from fingervision.models.finite_element import FiniteElementGripper, MechanismPlate
 from fingervision.models.gripper_mechanism import half_mechanism, redrawn, whole_mechanism
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_chain import MechanismChain
-from fingervision.models.physics import Physics
 from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.models_sway_table import stiffnesses
 

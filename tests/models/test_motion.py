@@ -10,12 +10,12 @@ from scipy.integrate import solve_ivp
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError, UsageError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.answer_figures import Physics
 from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping, parse_damping
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.modal_model import ModalModel, frequency_response, modal_motion, resolved_frequencies_hz
 from fingervision.models.motion_in_time import gripper_motion
-from fingervision.models.physics import Physics
 from fingervision.storage.mechanism_toml import read_mechanism
 
 HALF_PERCENT, ONE_PERCENT = 0.005, 0.01

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from fingervision.domain.gripper import Gripper
+from fingervision.models.answer_figures import Physics
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.physics import Physics
 from fingervision.models.reference_mesh import COMSOL_MM, INPUT_MM, PlaneMesh
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.storage.gripper_toml import read_gripper

@@ -11,9 +11,8 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.gripper_mechanism import redrawn
-from fingervision.models.hinge_correction import HingeTheory, planes_ratio
+from fingervision.models.hinge_correction import HingeTheory, Notch, beam_compliance, circular_notch, planes_ratio
 from fingervision.models.lumped import LumpedGripper
-from fingervision.models.notch import Notch, beam_compliance, circular_notch
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.width_effect import force_uncertainty, held_moduli
 from tests.benchmarks.hinge_solid import solid_compliance

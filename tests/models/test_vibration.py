@@ -5,13 +5,13 @@ from scipy.sparse import csr_matrix
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper
+from fingervision.models.answer_figures import Physics
 from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping, paper_rate
 from fingervision.models.generalized_alpha import integrate
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.modal_model import modal_motion
 from fingervision.models.mode_shapes import ModesWanted, mode_shapes
 from fingervision.models.motion_in_time import ReducedMotion
-from fingervision.models.physics import Physics
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 # Damping ratio of equation (4) by dimensionless frequency, printed with two or three digits.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fingervision.motion.encoder_interpolation import WAIT_FOR_BORDER_S, StageTrack
-from fingervision.testbed.reading import Reading
+from fingervision.testbed.force_sensor import Reading
 
 STEP_MM, RATE_HZ = 0.03, 200.0
 # A step boundary is passed between two readings: half of the distance between readings, at 0.5 mm/s.

@@ -5,8 +5,8 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.motion.move_limits import check_move, check_speed
-from fingervision.testbed.reading import Reading
 
 KEYS = ("upper_mm",)
 SIMULATED = True

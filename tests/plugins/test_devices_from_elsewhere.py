@@ -153,9 +153,9 @@ def test_a_kind_that_is_neither_installed_nor_a_file_is_refused(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_an_installed_model_answers_for_a_drawing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from fingervision.models.answer_figures import LINEAR, Physics
     from fingervision.models.hinge_correction import HingeTheory
-    from fingervision.models.physics import LINEAR, Physics
-    from fingervision.testbed.simulation.sample_gripper import sample_gripper
+    from fingervision.testbed.simulation.gripper import sample_gripper
 
     points = {"one_spring": "fvdemo_spring", "bent": "fvdemo_bent", "fails": "fvdemo_fails"}
     modules = {

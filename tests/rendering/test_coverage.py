@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from fingervision.domain.region import Region
+from fingervision.domain.frame import Region
 from fingervision.rendering.outline import Motion, disc
 from fingervision.rendering.picture import coverage
 from fingervision.rendering.polygon import polygon

@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingervision.domain.region import Region
-from fingervision.rendering.camera import Camera
+from fingervision.domain.frame import Region
+from fingervision.rendering.camera import Camera, RadialLens, Tilt, View
 from fingervision.rendering.finger import EllipticTip, finger_shape, half_ellipse
-from fingervision.rendering.lens import RadialLens, Tilt, View
 from fingervision.rendering.outline import Line, Outline, Piece, biarcs
 from fingervision.rendering.picture import coverage
 from fingervision.rendering.polygon import polygon

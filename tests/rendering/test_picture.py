@@ -7,13 +7,11 @@ import pytest
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.gap import NoGap
-from fingervision.rendering.camera import IDEAL_CAMERA, Camera
+from fingervision.rendering.camera import IDEAL_CAMERA, Camera, RadialLens, Tilt
 from fingervision.rendering.finger import Highlight
-from fingervision.rendering.lens import RadialLens, Tilt
-from fingervision.rendering.light import Light, LightStep
 from fingervision.rendering.outline import disc
 from fingervision.rendering.picture import exact_grey, render
-from fingervision.rendering.scene import Patch, Rim, Scene, dust
+from fingervision.rendering.scene import Light, LightStep, Patch, Rim, Scene, dust
 from fingervision.rendering.targets import bar
 from fingervision.rendering.truth import truth
 from fingervision.rendering.two_fingers import two_fingers

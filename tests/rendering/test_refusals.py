@@ -8,13 +8,11 @@ import pytest
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import DataError
-from fingervision.rendering.camera import IDEAL_CAMERA, Camera
+from fingervision.rendering.camera import IDEAL_CAMERA, Camera, RadialLens, Tilt
 from fingervision.rendering.finger import EllipticTip, SquareTip
-from fingervision.rendering.lens import RadialLens, Tilt
-from fingervision.rendering.light import Light
 from fingervision.rendering.outline import Line, Outline, disc
 from fingervision.rendering.polygon import polygon
-from fingervision.rendering.scene import Rim, Scene, dust
+from fingervision.rendering.scene import Light, Rim, Scene, dust
 from fingervision.rendering.targets import bar, chessboard, slot
 from fingervision.rendering.truth import truth
 from fingervision.rendering.two_fingers import two_fingers

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from fingervision.domain.direction import Direction
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
-from fingervision.rendering.camera import IDEAL_CAMERA, Camera
+from fingervision.rendering.camera import IDEAL_CAMERA, Camera, RadialLens, Tilt, View
 from fingervision.rendering.finger import EllipticTip, SquareTip
-from fingervision.rendering.lens import RadialLens, Tilt, View
 from fingervision.rendering.picture import exact_grey
 from fingervision.rendering.scene import Scene
 from fingervision.rendering.truth import TrueGap, truth

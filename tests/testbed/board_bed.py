@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fingervision.domain.step_data import StepData
-from fingervision.storage.steps_toml import read_steps
+from fingervision.storage.recipe_toml import read_steps
 from fingervision.testbed.motion.motion_profile import profile
 from fingervision.testbed.motion.move_limits import PUBLISHED
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from fingervision.domain.errors import OutputError
+from fingervision.storage.drive_csv import read_samples
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.recorded_video import frames_in
-from fingervision.storage.samples_csv import read_samples
 from fingervision.testbed.run.run_folder import remains
 from tests.testbed.simulated_beds import recipe_at, run, steps
 

@@ -11,9 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
-from fingervision.domain.with_uncertainty import with_uncertainty
+from fingervision.domain.numbers import with_uncertainty
+from fingervision.storage.drive_csv import read_samples
 from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.samples_csv import read_samples
 from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.testbed.simulation.injected_effects import Hidden
 from tests.testbed.simulated_beds import recipe_at, run, steps

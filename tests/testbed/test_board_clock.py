@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingervision.testbed.clocks.synchronisation import FEWEST, ClockJoin, JoinedClock
+from fingervision.testbed.clocks.clock import FEWEST, ClockJoin, JoinedClock
 
 BEGAN_S, RATE = 5000.0, 1.004
 ASK_EVERY_S = 0.02

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fingervision.testbed.camera import Latency
-from fingervision.testbed.clocks.synchronisation import ArrivalClock
+from fingervision.testbed.clocks.clock import ArrivalClock
 
 LEAST_S, U_LEAST_S, MEAN_MORE_S = 0.008, 0.0005, 0.002
 # Required uncertainty of times on the test bed, including that of the board.

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from fingervision.domain.errors import StateError
+from fingervision.storage.drive_csv import SampleRow, read_samples
 from fingervision.storage.recipe_toml import read_recipe
 from fingervision.storage.recorded_video import frames_in
-from fingervision.storage.samples_csv import SampleRow, read_samples
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.camera import BedCamera, Shot
 from fingervision.testbed.run.controls import Controls

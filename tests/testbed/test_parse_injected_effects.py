@@ -6,7 +6,7 @@ import pytest
 
 from fingervision.domain.errors import DataError, UsageError
 from fingervision.effects import catalogue
-from fingervision.testbed.simulation.parse_injected_effects import hidden_from, usual_values
+from fingervision.testbed.simulation.injected_effects import hidden_from, usual_values
 
 
 @pytest.mark.parametrize("name", sorted(catalogue()))

@@ -8,7 +8,7 @@ from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
 from fingervision.domain.errors import FingervisionError
-from fingervision.storage.samples_csv import read_samples
+from fingervision.storage.drive_csv import read_samples
 from tests.testbed.board_bed import CONTRACT_STEPS, written_bed
 from tests.testbed.simulated_beds import SHORT, run
 

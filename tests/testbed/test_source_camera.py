@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from fingervision.domain.errors import DeviceError, InputFileError
+from fingervision.storage.drive_csv import read_samples
 from fingervision.storage.recipe_toml import read_recipe
-from fingervision.storage.samples_csv import read_samples
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.run.recipe_run import run_recipe
 from tests.testbed.simulated_beds import live_camera_at, recipe_at, run, steps

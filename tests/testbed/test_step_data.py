@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.step_data import Coordinates, CycleTime, Operation, SpeedEntry, Step, StepData
-from fingervision.storage.steps_toml import read_steps, write_steps
+from fingervision.storage.recipe_toml import read_steps, write_steps
 from fingervision.testbed.actuator import StageLimits
-from fingervision.testbed.manual.step_running import steps_table
-from fingervision.testbed.manual.steps_figure import draw_steps
+from fingervision.testbed.manual.step_running import draw_steps, steps_table
 from fingervision.testbed.motion.step_checks import planned_sequence
 
 LIMITS = StageLimits(lower_mm=0.0, upper_mm=10.0, speed_mm_s=400.0, force_n=5.5)

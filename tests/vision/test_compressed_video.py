@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.frame import Coding, Frame
+from fingervision.domain.frame import Coding, Frame, Region
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.quantiser import Quantiser
-from fingervision.domain.region import Region
 from fingervision.vision.coded_picture import displaced_px
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 from tests.benchmarks.compressed_video import Shot, shots

@@ -6,9 +6,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.frame import Coding, Frame, Pixels
+from fingervision.domain.frame import Coding, Frame, Pixels, Region
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.pipeline import Settings, measure_frame
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from fingervision.domain.direction import Direction
-from fingervision.domain.frame import Frame, Pixels
+from fingervision.domain.frame import Frame, Pixels, Region
 from fingervision.domain.gap import GapMeasurement
-from fingervision.domain.region import Region
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import Frame, Region
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.domain.region import Region
 from fingervision.domain.status import Status
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 from tests.benchmarks.scenes.canvas import Canvas

@@ -14,7 +14,7 @@ from fingervision.diagnosis.bodies.place_search import PlaceSearch
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.models.corrected import CorrectedModel
-from fingervision.models.drawn_mechanism import DrawnMechanism
+from fingervision.models.physical_gripper import DrawnMechanism
 from fingervision.models.place_answers import PlaceAnswers
 
 Array = NDArray[np.float64]

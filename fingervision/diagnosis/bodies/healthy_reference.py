@@ -19,7 +19,7 @@ from fingervision.diagnosis.bodies.body_prediction import BodyPrediction
 from fingervision.diagnosis.bodies.channel_noise import ChannelNoise, channel_noise
 from fingervision.diagnosis.bodies.place_nuisances import RandomEffects
 from fingervision.diagnosis.bodies.place_search import ALIKE, PLAYS_MM, STRUCTURE_SHARE
-from fingervision.domain.flexure_outline import FlexureOutline
+from fingervision.domain.body_poses import FlexureOutline
 from fingervision.models.place_answers import PARTS, PlaceAnswers, PlaceChanges
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from fingervision.domain.drawing_form import DrawingForm, DrawnPart
 from fingervision.domain.effect import effect_key
 from fingervision.domain.parameter import Parameter
 from fingervision.effects import catalogue
-from fingervision.models.drawn_mechanism import GAP
+from fingervision.models.physical_gripper import GAP
 from fingervision.models.place_answers import AS_DRAWN, PlaceChanges, attachments
 
 _MIRRORED = 1e-3

@@ -27,7 +27,7 @@ from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, NamedEffect, Verdict
 from fingervision.effects import catalogue
 from fingervision.models.corrected import CorrectedModel
-from fingervision.models.drawn_mechanism import GAP as GAP_PAIR
+from fingervision.models.physical_gripper import GAP as GAP_PAIR
 from fingervision.models.place_answers import PlaceAnswers
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_candidates import PAIRS
 from fingervision.diagnosis.bodies.place_findings import Fitted
 from fingervision.domain.drawing_form import DrawnPart
+from fingervision.domain.numbers import with_uncertainty
 from fingervision.domain.report import Place
-from fingervision.domain.with_uncertainty import with_uncertainty
 from fingervision.models.place_answers import PlaceAnswers
 
 COVER = 2.0

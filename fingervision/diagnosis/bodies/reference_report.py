@@ -21,10 +21,10 @@ from fingervision.diagnosis.bodies.healthy_reference import (
     WhatChanged,
 )
 from fingervision.diagnosis.noise.replicates import resolution
+from fingervision.domain.body_poses import FlexureOutline
 from fingervision.domain.errors import DataError
-from fingervision.domain.flexure_outline import FlexureOutline
 from fingervision.domain.measured_table import MeasuredTable
-from fingervision.domain.with_uncertainty import with_uncertainty
+from fingervision.domain.numbers import with_uncertainty
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.place_answers import PlaceAnswers
 

@@ -14,7 +14,7 @@ from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import PointEffect
 from fingervision.domain.further_check import FurtherCheck
-from fingervision.domain.reference_slot import ReferenceSlot
+from fingervision.domain.measured_table import ReferenceSlot
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue, that_show
 

@@ -21,7 +21,7 @@ from fingervision.storage.beside import measurement_beside
 from fingervision.storage.model_toml import write_model
 from fingervision.storage.provenance import Provenance
 from fingervision.storage.recipe_toml import write_recipe
-from fingervision.storage.report_json import report_document, write_report
+from fingervision.storage.summary_json import report_document, write_report
 
 # Sentences on the clocks and the gap's uncertainty, from the summary of a measured table.
 

@@ -5,8 +5,8 @@ from math import ceil
 from typing import Annotated
 
 from fingervision.domain.field import Field
+from fingervision.domain.frame import Region
 from fingervision.domain.gap import GapMeasurement
-from fingervision.domain.region import Region
 from fingervision.gauges.common_keys import LONGEST_PX, Placed
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance

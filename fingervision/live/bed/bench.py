@@ -14,12 +14,11 @@ import av
 from fingervision.domain.errors import FingervisionError, StateError
 from fingervision.domain.frame import Frame
 from fingervision.domain.recipe import Recipe
-from fingervision.frames.received import Driven, Received
-from fingervision.frames.source import Description
+from fingervision.frames.source import Description, Driven, Received
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
 from fingervision.live.supervisor import Supervisor
-from fingervision.storage.samples_csv import SampleRow
+from fingervision.storage.drive_csv import SampleRow
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
@@ -27,8 +26,7 @@ from fingervision.testbed.manual.manual_control import Looking, home, jog, move
 from fingervision.testbed.run.controls import Controls
 from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testbed.run.synchronised_acquisition import Look, Sight
-from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
-from fingervision.testbed.simulation.parse_injected_effects import hidden_from
+from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden, hidden_from
 
 # Largest number of frames that wait for the live view; further frames are dropped, because the bed does not wait.
 FRAMES_WAITING = 50

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fingervision.domain.errors import FingervisionError, StateError, UsageError
+from fingervision.domain.frame import Region
 from fingervision.domain.numbers import stated_number
-from fingervision.domain.region import Region
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.view import View
 from fingervision.tables.units import known_unit

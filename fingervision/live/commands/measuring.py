@@ -16,9 +16,8 @@ from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
 from fingervision import __version__
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, NoCalibrationError, OutputError, StateError, UsageError
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import Frame, Region
 from fingervision.domain.gap import GapMeasurement
-from fingervision.domain.region import Region
 from fingervision.live.commands.asking import Answer, Request, box, check_scale, number, number_or_none, seen_of, shown
 from fingervision.live.view import View
 from fingervision.measuring.scale import stated_scale

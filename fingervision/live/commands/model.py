@@ -3,7 +3,7 @@
 from typing import Any
 
 from fingervision.domain.errors import StateError
-from fingervision.frames.received import Driven
+from fingervision.frames.source import Driven
 from fingervision.live.commands.asking import Answer, Request, number_or_none
 from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.session import Session

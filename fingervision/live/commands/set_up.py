@@ -10,9 +10,8 @@ from calib.calibration import is_stated
 from calib.measured_scale import Calibration
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import StateError, UsageError
-from fingervision.domain.frame import Frame
+from fingervision.domain.frame import Frame, Region
 from fingervision.domain.gap import GapMeasurement
-from fingervision.domain.region import Region
 from fingervision.inspection.catalogue import inspect
 from fingervision.inspection.report import as_json
 from fingervision.inspection.sample import take_sample

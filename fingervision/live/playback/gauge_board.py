@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from fingervision.domain.errors import DataError, FingervisionError, StateError
 from fingervision.gauges.gauge_file import MOST_GAUGES, SCHEMA, Gauge, check_gauges, gauge_of, gauges_in
-from fingervision.storage.gauges_toml import gauges_text, text_of, write_gauges_text
+from fingervision.storage.gauge_files import gauges_text, text_of, write_gauges_text
 from fingervision.storage.toml_section import Section, read_document
 
 USUAL_FILE = Path("gauges.toml")

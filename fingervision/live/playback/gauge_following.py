@@ -20,7 +20,7 @@ from fingervision.live.playback.playback import Playback
 from fingervision.measuring.frame_loop import Prepared, coded, prepared
 from fingervision.measuring.marked import marked
 from fingervision.measuring.task import Task
-from fingervision.storage.lost_frames import lost_frames
+from fingervision.storage.run_files import lost_frames
 
 LOOK_EVERY_S = 0.02
 # Number of frames that are measured ahead of the displayed frame, so that the next readings are ready at once.

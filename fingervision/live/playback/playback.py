@@ -23,7 +23,7 @@ from fingervision.live.supervisor import Supervisor, told
 from fingervision.live.view import Message, MessageListener, Messages
 from fingervision.measuring.marked import marked
 from fingervision.storage.gaps_csv import TIME_PLACES, GapRow
-from fingervision.storage.lost_frames import lost_frames
+from fingervision.storage.run_files import lost_frames
 
 # Access to single frames of a recording by number, which never returns a different frame.
 

@@ -9,9 +9,8 @@ import numpy as np
 from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import DataError, FingervisionError
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import Frame, LostFrame, Region
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.domain.region import Region
 from fingervision.frames.source import Description, FrameSource, Wish, open_source
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import FrameMeasurement, Seen

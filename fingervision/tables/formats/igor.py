@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from fingervision.domain.errors import DataError
-from fingervision.storage.number_columns import Numbers
-from fingervision.tables.cells import to_numbers
+from fingervision.storage.csv_columns import Numbers
+from fingervision.tables.dialect import to_numbers
 from fingervision.tables.mapping import Entry
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
 from fingervision.tables.text_file import lines_of

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fingervision.domain.errors import DataError
-from fingervision.storage.number_columns import Numbers
+from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.mapping import Entry
 from fingervision.tables.raw_table import RawColumn, RawTable, check_columns
 

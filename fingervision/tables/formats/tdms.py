@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from fingervision.domain.errors import DataError
-from fingervision.storage.number_columns import Numbers
-from fingervision.tables.column_names import column_name
+from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.mapping import Entry
 from fingervision.tables.needed_library import needed_library
 from fingervision.tables.parts import chosen_part
 from fingervision.tables.raw_table import RawColumn, RawTable
+from fingervision.tables.units import column_name
 from fingervision.tables.vectors import numbers
 
 ORDER = 50

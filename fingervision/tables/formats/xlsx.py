@@ -9,15 +9,14 @@ from re import findall
 from typing import Any
 
 from fingervision.domain.errors import DataError
-from fingervision.tables.cells import which_mark
-from fingervision.tables.column_names import column_name
-from fingervision.tables.dialect import THOUSANDS, is_number
+from fingervision.tables.dialect import THOUSANDS, is_number, which_mark
 from fingervision.tables.mapping import Entry
 from fingervision.tables.needed_library import needed_library
 from fingervision.tables.parts import chosen_part
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawTable
 from fingervision.tables.text_table import table_of_lines
+from fingervision.tables.units import column_name
 
 ORDER = 20
 MOST_UNPACKED_BYTES = 600_000_000

@@ -22,8 +22,8 @@ from fingervision.domain.errors import DeviceError, FingervisionError, StateErro
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, RefusedError, StageLimits
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.motion.move_limits import LIMIT_KEYS, FreeMoves, check_move, check_speed, stage_limits
-from fingervision.testbed.reading import Reading
 
 T = TypeVar("T")
 KEYS = (*LIMIT_KEYS, "zero_mm", "reversed")

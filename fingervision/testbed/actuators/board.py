@@ -7,7 +7,7 @@ from pathlib import Path
 from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.domain.step_data import Coordinates, StepData
 from fingervision.storage.board_toml import read_board
-from fingervision.storage.steps_toml import read_steps
+from fingervision.storage.recipe_toml import read_steps
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.board import controller_settings, wire
@@ -17,9 +17,9 @@ from fingervision.testbed.board.link import fingervision_at
 from fingervision.testbed.board.motions import Motions, Run
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.motion.move_limits import PUBLISHED, PUBLISHED_KEYS, check_move, check_speed, stage_limits
 from fingervision.testbed.motion.step_checks import jog_step, planned, route
-from fingervision.testbed.reading import Reading
 
 SIMULATED = False
 KEYS = (KEY, "steps", *PUBLISHED_KEYS, *controller_settings.KEYS)

@@ -9,8 +9,8 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.motion.move_limits import FreeMoves, check_move, stage_limits
-from fingervision.testbed.reading import Reading
 from fingervision.testbed.terminal import TERMINAL, Terminal
 
 KEYS = ("lower_mm", "upper_mm", "speed_mm_s", "accuracy_mm")

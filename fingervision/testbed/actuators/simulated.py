@@ -11,8 +11,8 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.motion.move_limits import FreeMoves, check_move, check_speed, stage_limits
-from fingervision.testbed.reading import Reading
 from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import Motion
 from fingervision.testbed.simulation.stage import SimulatedStage

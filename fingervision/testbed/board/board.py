@@ -14,8 +14,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.link import ASK_EVERY_S, BoardLink, BoardRefusalError, opened_port
 from fingervision.testbed.build_context import BuildContext
-from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.clocks.synchronisation import FEWEST, JoinedClock
+from fingervision.testbed.clocks.clock import FEWEST, Clock, JoinedClock
 
 # Opening the port may reset the board, which then starts its sketch within two seconds.
 STARTS_WITHIN_S = 1.0

@@ -18,8 +18,7 @@ from serial.tools.list_ports import comports
 
 from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.testbed.board import wire
-from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.clocks.synchronisation import ClockJoin, JoinedClock
+from fingervision.testbed.clocks.clock import Clock, ClockJoin, JoinedClock
 
 BAUD = 115200
 PROGRAM = "fingervision"

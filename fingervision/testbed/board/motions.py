@@ -13,8 +13,7 @@ from fingervision.testbed.board import wire
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.board.controller_settings import Waits
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion.commanded_path import CommandedPath
-from fingervision.testbed.motion.motion_profile import MotionProfile
+from fingervision.testbed.motion.motion_profile import CommandedPath, MotionProfile
 from fingervision.testbed.motion.step_checks import PlannedMotion
 
 # One motion by parallel lines: select, settle, drive, busy, not busy; each phase has its own time limit.

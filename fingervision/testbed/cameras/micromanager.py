@@ -13,8 +13,7 @@ import numpy as np
 
 from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Coding, Frame
-from fingervision.frames.received import Received
-from fingervision.frames.source import Description
+from fingervision.frames.source import Description, Received
 from fingervision.storage.toml_section import Section
 from fingervision.testbed import micromanager_core
 from fingervision.testbed.build_context import BuildContext

@@ -7,8 +7,7 @@ from typing import cast
 
 from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.domain.frame import Frame, LostFrame
-from fingervision.frames.received import LiveSource, Received
-from fingervision.frames.source import Wish, open_source
+from fingervision.frames.source import LiveSource, Received, Wish, open_source
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.camera import Latency

@@ -10,7 +10,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.board.board import KEY, Board, board_of
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.reading import Reading
+from fingervision.testbed.force_sensor import Reading
 
 KEYS = (KEY, "volts", "newtons", "reference_v")
 SIMULATED = False

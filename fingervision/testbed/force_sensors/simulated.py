@@ -6,7 +6,7 @@ from fingervision.domain.errors import DataError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.reading import Reading
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import SimulatedGripper
 

@@ -1,12 +1,18 @@
-"""Sequences of step data: their limits, their table, and their execution on a test bed."""
+"""Sequences of step data: their limits, their table and plot, and their execution on a test bed."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from fingervision.domain.errors import DataError
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fingervision.domain.errors import DataError, OutputError
 from fingervision.domain.step_data import CycleTime, Operation, StepData
-from fingervision.storage.steps_toml import read_steps
+from fingervision.storage.durable import replaced
+from fingervision.storage.recipe_toml import read_steps
 from fingervision.testbed.actuator import StageLimits
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import SIMULATED, open_bed, read_configuration
@@ -105,3 +111,66 @@ def _row(planned: PlannedMotion) -> tuple[str, ...]:
         f"{motion.speed_mm_s:.1f}", f"{motion.acceleration_mm_s2:.0f}", f"{motion.deceleration_mm_s2:.0f}",
         f"{planned.force_n:.2f}",
     )  # fmt: skip
+
+
+# Plot of a sequence of steps: position and speed over time.
+
+SIZE_INCHES, DOTS_PER_INCH = (9.0, 6.0), 130
+LINE_COLOUR, LIMIT_COLOUR, PUSHING_COLOUR = "#11507a", "#c0392b", "#e8c170"
+POINTS_PER_MOTION = 200
+# Pause that is drawn between two motions, as a share of the whole time, so that each motion can be seen.
+STANDING_SHARE = 0.02
+TITLE_PAD_POINTS = 30.0
+
+
+def draw_steps(path: Path, name: str, motions: Sequence[PlannedMotion], limits: StageLimits) -> None:
+    """Plot position and speed of a sequence over time, with motions numbered and pushing motions shaded.
+
+    Raises
+    ------
+    OutputError
+        The picture cannot be written.
+    """
+    figure = Figure(figsize=SIZE_INCHES, layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    standing_s = STANDING_SHARE * max(sum(each.motion.seconds for each in motions), 1e-3)
+    begin_s = 0.0
+    for planned in motions:
+        begin_s = _draw_motion(upper, lower, planned, begin_s, standing_s)
+    upper.set_title(name, pad=TITLE_PAD_POINTS)
+    upper.set_ylabel("position (mm)")
+    lower.set_ylabel("speed (mm/s)")
+    lower.set_xlabel("time (s), with a short pause after each motion; shaded: pushing; dashed: limits of the stage")
+    for level_mm in (limits.lower_mm, limits.upper_mm):
+        upper.axhline(level_mm, color=LIMIT_COLOUR, linewidth=0.8, linestyle="--")
+    fastest_mm_s = max((each.motion.speed_mm_s for each in motions), default=0.0)
+    if fastest_mm_s > 0.5 * limits.speed_mm_s:
+        for level_mm_s in (-limits.speed_mm_s, limits.speed_mm_s):
+            lower.axhline(level_mm_s, color=LIMIT_COLOUR, linewidth=0.8, linestyle="--")
+    for axes in (upper, lower):
+        axes.grid(visible=True, alpha=0.3)
+    try:
+        with replaced(path) as part:
+            figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
+    except OSError as error:
+        raise OutputError(f"The plot {path} could not be written ({error.strerror}).") from error
+
+
+def _draw_motion(upper: Axes, lower: Axes, planned: PlannedMotion, begin_s: float, standing_s: float) -> float:
+    """Plot one motion and the pause after it; return the time of its end (s)."""
+    motion = planned.motion
+    end_s = begin_s + motion.seconds
+    since_s = np.append(np.linspace(0.0, motion.seconds, POINTS_PER_MOTION), motion.seconds + standing_s)
+    upper.plot(begin_s + since_s, planned.from_mm + motion.travelled_mm(since_s), color=LINE_COLOUR)
+    lower.plot(begin_s + since_s, motion.speeds_mm_s(since_s), color=LINE_COLOUR)
+    if planned.step.operation is Operation.PUSHING:
+        upper.axvspan(begin_s, end_s, color=PUSHING_COLOUR, alpha=0.5, linewidth=0)
+        lower.axvspan(begin_s, end_s, color=PUSHING_COLOUR, alpha=0.5, linewidth=0)
+    words = (
+        f"{planned.number}\n{planned.step.pushing_force_n:g} N" if planned.step.pushing_force_n else str(planned.number)
+    )
+    upper.annotate(
+        words, (0.5 * (begin_s + end_s), 1.0), (0, 3), xycoords=("data", "axes fraction"),
+        textcoords="offset points", ha="center", va="bottom", fontsize="small",
+    )  # fmt: skip
+    return end_s + standing_s

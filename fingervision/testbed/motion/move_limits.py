@@ -1,5 +1,6 @@
-"""Limits of a stage: what a configuration states of them, and what a motion must keep."""
+"""Limits of a stage and of recipes (soft limits): what a configuration states, and what a motion must keep."""
 
+from dataclasses import dataclass, replace
 from math import inf
 
 from fingervision.domain.errors import LimitError
@@ -100,3 +101,39 @@ def stage_limits(section: Section, default: StageLimits | None = None) -> StageL
 # Hricko and Havlik (2015), section 3: stroke 10 mm, 400 mm/s, positioning accuracy +-90 um, 5.5 N.
 PUBLISHED = StageLimits(lower_mm=0.0, upper_mm=10.0, speed_mm_s=400.0, force_n=5.5, accuracy_mm=0.09)
 PUBLISHED_KEYS = LIMIT_KEYS[:5]
+
+
+# Soft limits: the range allowed for recipes and jogs, within the limits of the actuator.
+
+
+@dataclass(frozen=True, slots=True)
+class SoftLimits:
+    """Soft limits of one test bed, checked before any motion and monitored during it.
+
+    Parameters
+    ----------
+    lower_mm, upper_mm : float
+        Range of positions of the stage.
+    speed_mm_s : float
+        Highest speed of the stage.
+    force_n : float
+        Largest force at the drive, in either direction; above it the stage stops.
+    gap_mm : float
+        Smallest gap while the stage closes; below it the stage stops.
+    """
+
+    lower_mm: float
+    upper_mm: float
+    speed_mm_s: float
+    force_n: float
+    gap_mm: float = 0.0
+
+    def within(self, able: StageLimits) -> "SoftLimits":
+        """Narrow the limits to those of an actuator."""
+        return replace(
+            self,
+            lower_mm=max(self.lower_mm, able.lower_mm),
+            upper_mm=min(self.upper_mm, able.upper_mm),
+            speed_mm_s=min(self.speed_mm_s, able.speed_mm_s),
+            force_n=min(self.force_n, able.force_n),
+        )

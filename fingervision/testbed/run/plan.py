@@ -11,7 +11,7 @@ from fingervision.domain.model import Model
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import MoveCheck
-from fingervision.testbed.motion.soft_limits import SoftLimits
+from fingervision.testbed.motion.move_limits import SoftLimits
 from fingervision.testbed.recipe_kinds import step_of
 from fingervision.testbed.recipe_kinds.sine import fastest_mm_s
 from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn

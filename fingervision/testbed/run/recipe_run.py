@@ -10,18 +10,17 @@ from typing import Any
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.recipe import Recipe
 from fingervision.measuring.rehearsal import rehearse
-from fingervision.storage.samples_csv import SampleRow
+from fingervision.storage.drive_csv import SampleRow
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.manual import manual_control
 from fingervision.testbed.run import step_executor
 from fingervision.testbed.run.controls import Controls
-from fingervision.testbed.run.motion_ratio import LARGEST_RATIO, MotionRatio
 from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
 from fingervision.testbed.run.plan import REST_FRAMES, Plan, check_moves, plan
 from fingervision.testbed.run.run_folder import BedRunFolder
 from fingervision.testbed.run.run_record import Counts, OnRow, RunRecord
-from fingervision.testbed.run.safety_monitor import Say, Watch
+from fingervision.testbed.run.safety_monitor import LARGEST_RATIO, MotionRatio, Say, Watch
 from fingervision.testbed.run.synchronised_acquisition import Sight
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
 

@@ -22,18 +22,18 @@ from fingervision.frames.video_file import VideoFile
 from fingervision.measuring.camera_learning import camera_beside
 from fingervision.measuring.run_table import Measured, RunTable
 from fingervision.storage.calibration_json import write_calibration
+from fingervision.storage.drive_csv import SampleRow, SamplesCsv, read_samples, write_rows
 from fingervision.storage.durable import remove_empty
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.out_folder import FolderLock, make_out_folder
 from fingervision.storage.plain_file import json_of
 from fingervision.storage.recorded_video import RecordedVideo, frames_in
 from fingervision.storage.run_files import CALIBRATION, EVENTS, RUN, SCHEMA, VIDEO, RunFiles, device_of
-from fingervision.storage.samples_csv import SampleRow, SamplesCsv, read_samples, write_rows
 from fingervision.storage.simulation_table import write_simulation
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
-from fingervision.testbed.motion.soft_limits import SoftLimits
-from fingervision.testbed.run.motion_ratio import inputs_within
+from fingervision.testbed.motion.move_limits import SoftLimits
+from fingervision.testbed.run.safety_monitor import inputs_within
 from fingervision.testbed.run.synchronised_acquisition import Sight
 from fingervision.testbed.simulation.injected_effects import Hidden
 

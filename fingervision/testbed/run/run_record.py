@@ -10,8 +10,8 @@ from fingervision.domain.effect import REZEROED
 from fingervision.domain.frame import Frame
 from fingervision.measuring.camera_learning import WANTED
 from fingervision.measuring.run_table import Measured
+from fingervision.storage.drive_csv import MM_PLACES, SampleRow, row_with
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.storage.samples_csv import MM_PLACES, SampleRow, row_with
 from fingervision.testbed.run.run_folder import BedRunFolder
 from fingervision.testbed.run.synchronised_acquisition import Look
 

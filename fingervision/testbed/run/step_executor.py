@@ -10,8 +10,8 @@ from calib.errors import CalibrationError
 from calib.known_widths import KnownSize, find_widths
 from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Frame
+from fingervision.domain.numbers import with_uncertainty
 from fingervision.domain.status import Status
-from fingervision.domain.with_uncertainty import with_uncertainty
 from fingervision.measuring.scale import Scale
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.run.motion_segments import Close, Frames, Go, Slot, Stand, Swing

@@ -17,9 +17,8 @@ from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.actuator import Actuator
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.camera import BedCamera, Shot
-from fingervision.testbed.clocks.synchronisation import ArrivalClock, ClockJoin
-from fingervision.testbed.force_sensor import ForceSensor
-from fingervision.testbed.reading import Reading
+from fingervision.testbed.clocks.clock import ArrivalClock, ClockJoin
+from fingervision.testbed.force_sensor import ForceSensor, Reading
 from fingervision.testbed.text_protocol.sensor import TextSensor
 from fingervision.vision.pipeline import measure_frame
 

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from fingervision.domain.effect import DriveEffect, History, PointEffect
 from fingervision.domain.further_check import FurtherCheck
+from fingervision.domain.gripper import Body, Gripper, Material
 from fingervision.domain.model import Model
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
 from fingervision.effects.backlash import EFFECT as BACKLASH
+from fingervision.models.reference_mesh import REFERENCE_HINGE, REFERENCE_LEVER, REFERENCE_LINKS
 from fingervision.testbed.simulation.injected_effects import Hidden
 from fingervision.testbed.simulation.optics import in_the_picture
 
@@ -178,3 +180,17 @@ class SimulatedGripper:
         frames = u[::STEPS_A_FRAME]
         seen = replace(history, input_mm=frames, time_s=history.times[::STEPS_A_FRAME], runs=runs)
         return np.repeat(effect.act(frames, seen, self._drive[effect.name]), STEPS_A_FRAME)[: u.size]
+
+
+# Drawing of the published physical sample, the default gripper of a simulated test bed.
+
+
+def sample_gripper() -> Gripper:
+    """Return the drawing of the published gripper; only its material and body are published values."""
+    return Gripper(
+        material=Material("PA2200", 1650.0, 0.34, 930.0, 48.0),
+        body=Body(80.0, 100.0, 3.0, 4.0, 0.3),
+        hinge=REFERENCE_HINGE,
+        lever=REFERENCE_LEVER,
+        links=REFERENCE_LINKS,
+    )

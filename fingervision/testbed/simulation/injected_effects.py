@@ -1,9 +1,17 @@
-"""Effects that are injected into a simulated test bed, with their parameters."""
+"""Effects injected into a simulated test bed, from command-line arguments or from a sealed file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
+import numpy as np
+
+from fingervision.domain.effect import Effect, History
+from fingervision.domain.errors import DataError, UnknownNameError, UsageError
 from fingervision.effects import catalogue
+from fingervision.storage.toml_section import Section, read_document
+
+# Effects that are injected into a simulated test bed, with their parameters.
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,3 +36,106 @@ class Hidden:
 
 
 NOTHING = Hidden()
+
+
+# Size of an effect that is named without a size: this share of the range between its bounds, or this multiple of its
+# typical size.
+SHARE_OF_BOUNDS, TIMES_TYPICAL = 0.2, 3.0
+# Bounds that depend on the data are computed for a run over the inputs of the published sample: 25 samples per second
+# at 0.05 mm/s.
+USUAL_INPUTS_MM, USUAL_STEP_MM = (-0.45, 1.45), 0.002
+
+
+def hidden_from(words: tuple[str, ...]) -> Hidden:
+    """Read injected effects, each given as `EFFECT[:PARAMETER=VALUE,...]` or by a sealed file.
+
+    A sealed file, which hides the effects from the person who diagnoses the run, has the form of a model.toml:
+    `[[effect]]` with `name` and `[effect.parameters]` of plain numbers.
+
+    Raises
+    ------
+    UsageError
+        An effect or parameter is not in the catalogue, or a value is no number.
+    DataError, InputFileError
+        A file cannot be read or is not valid.
+    """
+    effects: dict[str, dict[str, float]] = {}
+    for word in words:
+        more = _sealed(Path(word)) if word.lower().endswith(".toml") else [_spoken(word)]
+        for name, values in more:
+            if name in effects:
+                raise UsageError(f"--hide may name each effect only once, but {name} is named twice: leave one out.")
+            effects[name] = usual_values(catalogue()[name]) | values
+    return Hidden(effects)
+
+
+def usual_values(effect: Effect) -> dict[str, float]:
+    """Parameter values for an injected effect without stated values: clearly visible, and within the bounds."""
+    inputs = np.arange(*USUAL_INPUTS_MM, USUAL_STEP_MM)
+    history = History(
+        input_mm=inputs,
+        time_s=np.arange(inputs.size) / 25.0,
+        runs=(slice(0, inputs.size),),
+        rest_gap_mm=4.0,
+        opening_mm=11.0,
+        closing_mm=3.5,
+        force=True,
+    )
+    searched = effect.search(history)
+    values = {}
+    for p in effect.parameters if isinstance(searched, str) else searched:
+        if p.run is not None:  # parameters of single runs keep their defaults
+            continue
+        if p.typical is not None:
+            values[p.name] = min(TIMES_TYPICAL * p.typical, p.upper)
+        elif p.neutral is not None:
+            values[p.name] = p.neutral + SHARE_OF_BOUNDS * ((p.upper if p.upper > p.neutral else p.lower) - p.neutral)
+        elif p.logarithmic or p.reciprocal:
+            values[p.name] = float(np.sqrt(max(p.lower, 1e-3 * p.upper) * p.upper))
+        else:
+            values[p.name] = p.lower + SHARE_OF_BOUNDS * (p.upper - p.lower)
+    return values
+
+
+def _spoken(word: str) -> tuple[str, dict[str, float]]:
+    name, _, rest = word.partition(":")
+    if name not in catalogue():
+        raise UnknownNameError("hide", name, catalogue(), "an effect", "`fingervision effects` lists them")
+    values: dict[str, float] = {}
+    for part in filter(None, rest.split(",")):
+        key, equals, number = part.partition("=")
+        if not equals:
+            raise UsageError(f"--hide must be EFFECT or EFFECT:PARAMETER=VALUE,..., but is {word}.")
+        try:
+            values[key.strip()] = float(number)
+        except ValueError:
+            raise UsageError(f"{key} of {name} must be a number, but is {number}.") from None
+    _inside(name, values)
+    return name, values
+
+
+def _sealed(path: Path) -> list[tuple[str, dict[str, float]]]:
+    document, text = read_document(path, "sealed file")
+    top = Section(path, text, "", document)
+    top.only(("schema", "effect"))
+    read = []
+    for section in top.tables("effect"):
+        section.only(("name", "parameters"))
+        name = section.word("name", of=catalogue())
+        parameters = section.table("parameters")
+        values = {key: parameters.number(key) for key in parameters.values}
+        _inside(name, values)
+        read.append((name, values))
+    if not read:
+        raise DataError(f"{path} must have at least one [[effect]], but has none.")
+    return read
+
+
+def _inside(name: str, values: dict[str, float]) -> None:
+    known = {p.name: p for p in catalogue()[name].parameters}
+    for key, value in values.items():
+        if key not in known:
+            raise UsageError(f"A parameter of {name} must be one of {', '.join(known)}, but is {key}.")
+        p = known[key]
+        if not p.lower <= value <= p.upper:
+            raise UsageError(f"{key} of {name} must be between {p.lower:g} and {p.upper:g}, but is {value:g}.")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.testbed.actuator import Actuator
-from fingervision.testbed.reading import Reading
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.simulation.gripper import Motion
 
 Array = NDArray[np.float64]

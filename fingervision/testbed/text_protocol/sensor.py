@@ -8,8 +8,8 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import RefusedError
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.motion.move_limits import ENDLESS_N
-from fingervision.testbed.reading import Reading
 from fingervision.testbed.text_protocol import line
 from fingervision.testbed.text_protocol.line import Line, opened_line
 from fingervision.testbed.text_protocol.words import Words, number_in, words_of

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from fingervision.domain.errors import StateError
+from fingervision.storage.drive_csv import SampleRow, read_samples
 from fingervision.storage.recipe_toml import read_recipe
-from fingervision.storage.samples_csv import SampleRow, read_samples
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.run.controls import Controls
 from fingervision.testbed.run.recipe_run import run_recipe

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from fingervision.domain.errors import DeviceError, FingervisionError, LimitError
+from fingervision.storage.drive_csv import read_samples
 from fingervision.storage.recorded_video import frames_in
-from fingervision.storage.samples_csv import read_samples
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.device_kinds import kinds

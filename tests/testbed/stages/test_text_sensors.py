@@ -11,8 +11,8 @@ from numpy.testing import assert_array_equal
 
 from fingervision.domain.errors import DataError, DeviceError
 from fingervision.domain.status import Status
+from fingervision.storage.drive_csv import read_samples, row_with, write_rows
 from fingervision.storage.recipe_toml import read_recipe
-from fingervision.storage.samples_csv import read_samples, row_with, write_rows
 from fingervision.tables.read import read_measured_table
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed

@@ -11,7 +11,7 @@ from fingervision.cli import cli
 from fingervision.domain.errors import DataError, DeviceError, FingervisionError
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.manual import manual_control
-from fingervision.testbed.manual.stopping import stop_bed
+from fingervision.testbed.manual.manual_control import stop_bed
 from fingervision.testbed.text_protocol.words import known_words
 from tests.testbed.stages.emulators import Conex, Emulator, Invented, Zaber
 from tests.testbed.stages.stage_cases import CASES, Case, text
