@@ -49,6 +49,25 @@ def test_a_small_harmonic_is_no_second_name(tmp_path: Path, harmonic: float) -> 
         assert float(told[1]) == pytest.approx(100.0 * harmonic, abs=SHARE_PERCENT)
 
 
+def test_an_error_with_many_harmonics_is_one_cyclic_error(tmp_path: Path) -> None:
+    # A resolver against counted steps, one way at constant speed: the harmonics of its error fall with their order.
+    u = 0.9 + 0.0075 * np.arange(500)
+    angle = 2.0 * np.pi * u / PERIOD_MM
+    shares = (1.0, 0.073, 0.053, 0.029, 0.020, 0.012)
+    off = sum(share * np.sin(k * angle + 0.7 * k) for k, share in enumerate(shares, start=1))
+    gap = 5.0 + u + AMPLITUDE_MM * off + 3e-5 * np.random.default_rng(SEED).standard_normal(u.size)
+    rows = [f"{0.03 * k},{u[k]},{gap[k]:.6f}" for k in range(u.size)]
+    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
+    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n0,5\n6,11\n")
+    report = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv")).report
+    assert report.verdict is Verdict.NAMED
+    assert report.alternatives == (("encoder_cyclic_error",),)
+    amplitude = report.effects[0].parameters["amplitude_mm"]
+    assert amplitude.u is not None
+    assert abs(amplitude.value - AMPLITUDE_MM) < 2.0 * amplitude.u
+    assert "harmonic of order 2" in report.remaining
+
+
 @pytest.mark.slow
 @pytest.mark.long
 def test_a_large_harmonic_is_told(tmp_path: Path) -> None:

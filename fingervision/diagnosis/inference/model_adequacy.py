@@ -16,10 +16,12 @@ from fingervision.diagnosis.input.record_nuisances import below_the_input
 from fingervision.domain.effect import Array, Flags
 from fingervision.effects import catalogue
 
-ORDERS = (2, 3)
+ORDERS = (2, 3, 4, 5, 6, 7)
 """Orders of the harmonics that accompany the first harmonic of a screw or resolver."""
 LARGEST = 0.25
 """Ratio to the amplitude of the first harmonic above which another harmonic counts as a separate cause."""
+VERY_STRONG = 10.0
+"""Threshold of very strong evidence on the scale of BIC (Kass & Raftery 1995)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,19 +32,19 @@ class Harmonics:
     ----------
     columns : ndarray of float, shape (m, k)
         Whitened changes of the prediction, sine and cosine of each order.
+    fitted_mm : ndarray of float, shape (m,)
+        Change of the prediction by the harmonics.
     words : str
-        Description of the strongest harmonic.
-    gain : float
-        Chi-square that the harmonics explain.
+        Description of the strongest harmonic; empty if there are none.
     """
 
     columns: Array
+    fitted_mm: Array
     words: str = ""
-    gain: float = 0.0
 
 
 def harmonics(problem: Problem, best: Explanation) -> Harmonics:
-    """Fit the harmonics of a named cyclic error; none if they are too large to belong to it.
+    """Fit the harmonics of a named cyclic error; none if they are not significant, or too large to belong to it.
 
     Parameters
     ----------
@@ -51,7 +53,8 @@ def harmonics(problem: Problem, best: Explanation) -> Harmonics:
     best : Explanation
         The named explanation.
     """
-    none = Harmonics(np.zeros((problem.measured.size, 0)))
+    rows = problem.measured.size
+    none = Harmonics(np.zeros((rows, 0)), np.zeros(rows))
     periodic = [(name, effect.wave) for name, effect in catalogue().items() if name in best.names and effect.wave]
     if not periodic:
         return none
@@ -59,29 +62,31 @@ def harmonics(problem: Problem, best: Explanation) -> Harmonics:
     name, wave_names = periodic[0]
     amplitude_mm, period_mm = (best.values[name][key] for key in wave_names)
     base = chain.stacked(best.values)
+    # The harmonics of a periodic curve without jumps fall with the square of their order.
+    sds = 1.0 / np.array(ORDERS) ** 2
     waves = []
-    for order in ORDERS:
+    for order, sd in zip(ORDERS, sds.tolist(), strict=True):
         phase = 2.0 * np.pi * order * history.input_mm / period_mm
         for wave in (np.sin(phase), np.cos(phase)):
-            moved = chain.with_input(history.input_mm + LARGEST * amplitude_mm * wave)
+            moved = chain.with_input(history.input_mm + sd * amplitude_mm * wave)
             waves.append(moved.stacked(best.values) - base)
-    columns = problem.whitener.columns(np.stack(waves, axis=1))[0]
-    metric = problem.offsets.metric(best.sigma_mm)
-    bent = problem.offsets.beside(columns, metric)
+    waves_mm = np.stack(waves, axis=1)
+    columns = problem.whitener.columns(waves_mm)[0]
+    bent = problem.offsets.beside(columns, problem.offsets.metric(best.sigma_mm))
     taken = bent.T @ best.residual
-    share = np.linalg.pinv(columns.T @ bent) @ taken
-    sizes = LARGEST * np.hypot(share[0::2], share[1::2])
-    if np.max(sizes) > LARGEST:
-        return none
+    inner = columns.T @ bent + np.eye(taken.size)
+    share = np.linalg.solve(inner, taken)
+    evidence = float(share @ taken - np.linalg.slogdet(inner)[1])
+    sizes = sds * np.hypot(share[0::2], share[1::2])
     strongest = int(np.argmax(sizes))
+    if evidence < VERY_STRONG or sizes[strongest] > LARGEST:
+        return none
     words = f"the screw's harmonic of order {ORDERS[strongest]}, {100.0 * sizes[strongest]:.0f} % of its first"
-    return Harmonics(columns, words, float(share @ taken))
+    return Harmonics(columns, waves_mm @ share, words)
 
 
 LONG = 4000
 """Number of samples above which fewer probes are used."""
-VERY_STRONG = 10.0
-"""Threshold of very strong evidence on the scale of BIC (Kass & Raftery 1995)."""
 SAME_SHAPE = 0.9
 """Correlation above which a probe has the same shape as an effect."""
 STAND_INS = 2
@@ -251,7 +256,7 @@ def remaining_structure(problem: Problem, shapes: Probes, best: Explanation) -> 
         # A jump that went astray, and all that follow it, are a noise of their own level.
         gain = gain * min(1.0, problem.rows / best.score)
     if gain[top] <= threshold:
-        return None, own.words if own.gain > threshold else None
+        return None, None
     size_mm = _size_in_runs(problem, float(dot[top]) / float(norm[top]) * shapes.before_whitening(top))
     words = f"{shapes.words[top]} ({1e3 * size_mm:.2g} um RMS)"
     if below_the_input(problem, size_mm):

@@ -134,10 +134,11 @@ def beside_map(state: Searched, look: Look) -> Searched:
 
 
 def _contested(state: Searched, reason: str) -> Searched:
-    """Name nothing if an unknown curve over the input is far more probable than the names, which leave more than noise.
+    """Name no effect that an unknown curve over the input, far more probable, replaces; keep those beside the curve.
 
     Such a curve has no name where the table does not show whether it is repeatable, but it may be the cause. For
-    example, a drive that sags under gravity, driven one way for six seconds, was taken for a creep of 16 s.
+    example, a drive that sags under gravity, driven one way for six seconds, was taken for a creep of 16 s. A curve
+    beside the same effects only describes what they leave.
     """
     found = state.found
     acting = {name for name in found.best.names if found.problem.effects[name].memory}
@@ -148,13 +149,16 @@ def _contested(state: Searched, reason: str) -> Searched:
     if likelier is None:
         return state
     known, curve = likelier
+    if known is not None and known.names == found.best.names:
+        return state
     beside = "" if known is None else f" beside {' and '.join(known.names)}"
     words = (
         f"a curve over the input of {1e3 * curve.rms_mm.value:.2g} um RMS{beside} is far more probable than "
         f"{' and '.join(found.best.names)}, but {reason}"
     )
-    nothing = found.problem.nothing()
-    return replace(state, found=replace(found, best=nothing, alternatives=(), unknown=words))
+    part = found.problem.nothing() if known is None else _refitted(found.problem, known)
+    kept = (part,) if part.names else ()
+    return replace(state, found=replace(found, best=part, alternatives=kept, unknown=words))
 
 
 def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:

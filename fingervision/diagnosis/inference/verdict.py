@@ -8,6 +8,7 @@ from scipy.stats import f as fisher
 from fingervision.diagnosis.inference.held_out_prediction import rms_mm
 from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.inference.measuring_chain import Settings
+from fingervision.diagnosis.inference.model_adequacy import harmonics
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
@@ -253,7 +254,7 @@ def form_error_mm(data: Observations, found: Findings) -> Array:
     """Estimated error of the formulas of the best explanation, as far as its kind is known; shape (m,) (mm)."""
     columns_mm = data.form_errors_mm(found.best.values)
     sizes, _ = estimated_coefficients(found.problem, found.best, columns_mm.shape[1], data.behind(FORM))
-    return np.asarray(columns_mm @ sizes, dtype=np.float64)
+    return np.asarray(columns_mm @ sizes + harmonics(found.problem, found.best).fitted_mm, dtype=np.float64)
 
 
 def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict, str | None]:

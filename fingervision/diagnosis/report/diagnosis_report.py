@@ -12,6 +12,7 @@ from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.held_out_prediction import left_out_rms_mm, rms_mm
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.measuring_chain import Settings
+from fingervision.diagnosis.inference.model_adequacy import harmonics
 from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.search_state import Findings
@@ -292,7 +293,7 @@ def diagnosis_report(
         pure_error_mm=None if errors is None else errors[0].sd_mm,
         smallest_seen=found.smallest,
         unknown=unknown,
-        remaining=remaining(stands, found.left_over, best.sigma_mm),
+        remaining=remaining(stands, found.left_over, harmonics(found.problem, best).words, best.sigma_mm),
         next_run=proposal,
         excluded=tuple({"name": name, "reason": reason} for name, reason in data.excluded.items()),
         outliers=outliers(data, found.problem, rows, answered.after_mm),

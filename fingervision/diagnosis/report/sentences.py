@@ -110,8 +110,8 @@ def detail_lines(
     return tuple(f"size: {phrase(effect)}" for effect in effects) if len(effects) > 1 else ()
 
 
-def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, ...]) -> str:
-    """Sentence about the residual that remains."""
+def remaining(stands: Standing, left_over: str | None, harmonic: str, scatter_mm: tuple[float, ...]) -> str:
+    """Sentence about the residual that remains beside the named effects and the harmonics of a cyclic error."""
     if stands.is_noise:
         what = "random noise only" if stands.noise_is_known else "random noise or an error of the model"
         words = f"The remaining difference is {stands.after_mm:.3g} mm RMS: {what}"
@@ -122,6 +122,8 @@ def remaining(stands: Standing, left_over: str | None, scatter_mm: tuple[float, 
         )
     if left_over is not None:
         words += f"; the largest part of it is {left_over}, small compared with the explained part"
+    if harmonic:
+        words += f"; it does not contain {harmonic}, which was fitted too"
     if max(scatter_mm, default=0.0) > 0.0:
         words += f"; the runs have offsets of {scatter_mm[0]:.2g} mm RMS in the gap"
     return words + "."
