@@ -54,6 +54,18 @@ def test_an_offset_is_as_uncertain_as_a_mean(problem: Problem) -> None:
     assert abs(answer.values["rest_gap_error"]["offset_mm"]) < 3.0 * expected
 
 
+def test_a_noise_of_few_degrees_of_freedom_gives_every_parameter_students_width(problem: Problem) -> None:
+    names = ("rest_gap_error", "lever_ratio_error", "assembly_asymmetry", "camera_drift")
+    start = {"offset_mm": 0.001, "ratio": 0.001, "share": 0.001, "rate_mm_per_s": 1e-5}
+    degrees = 8.0
+    noises = tuple(replace(noise, slow_doubt=float(np.sqrt(2.0 / degrees))) for noise in problem.whitener.noises)
+    unsure = replace(problem, whitener=replace(problem.whitener, noises=noises))
+    best = fit(unsure, names, dict(zip(names, ({key: by} for key, by in start.items()), strict=True)), iterations=20)
+    answer, _ = settled(unsure, best, np.random.default_rng(SEED))
+    wider = np.sqrt(np.diag(answer.covariance) / np.diag(best.covariance))
+    assert wider == pytest.approx(np.sqrt(degrees / (degrees - 2.0)), rel=WALK)
+
+
 def test_a_play_of_nothing_is_not_known_exactly(problem: Problem) -> None:
     answer, u = settle(problem, "backlash", "play_mm", 1e-4)
     play_mm = answer.values["backlash"]["play_mm"]

@@ -121,14 +121,16 @@ def _widths(problem: Problem, explanation: Explanation, walk: _Coordinates, best
     return covariance
 
 
-def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) -> tuple[Point, ...]:
+def draws(
+    problem: Problem, explanation: Explanation, rng: np.random.Generator, most: int = MOST_STEPS
+) -> tuple[Point, ...]:
     """Sample the posterior under flat priors within the bounds (Metropolis et al. 1953; Tierney 1994).
 
     The curvature at the best fit ignores bounds and non-parabolic likelihoods: a fraction estimated as zero is still
     uncertain, and the prediction has no derivative with respect to the size of a jump. Independent proposals from the
     curvature alternate with local steps of several sizes, so that parabolic and irregular posteriors are both explored.
     The spreads of the runs' offsets, and noise levels within `noise_doubt`, are sampled too, so that the posterior has
-    Student's tails (Box & Tiao 1973).
+    Student's tails (Box & Tiao 1973). A walk has at most `most` steps.
 
     Returns
     -------
@@ -147,16 +149,19 @@ def draws(problem: Problem, explanation: Explanation, rng: np.random.Generator) 
         z = inverse @ (at - best)
         return -0.5 * (FREEDOM + best.size) * float(np.log1p(z @ z / FREEDOM))
 
+    # Integrated over the level of the noise, of which as many degrees of freedom are known, the posterior of each
+    # parameter is Student's distribution with these degrees of freedom.
     level = 2.0 / noise_doubt(problem) ** 2
     least = problem.cost(explanation.values)
 
     def cost(at: Array) -> float:
-        return level * float(np.log1p(max((problem.cost(walk.at(at)) - least) / level, -0.5)))
+        above = problem.cost(walk.at(at)) - least
+        return (level + best.size) * float(np.log1p(max(above / level, -0.5)))
 
     now, score = best, 0.0
     kept: list[Array] = []
     local = root
-    for count in range(int(np.clip(EVALUATED / problem.chain.history.input_mm.size, LEAST_STEPS, MOST_STEPS))):
+    for count in range(int(np.clip(EVALUATED / problem.chain.history.input_mm.size, LEAST_STEPS, most))):
         ahead, alone = rng.standard_normal(best.size), bool(count % 2)
         if count and count % LEARNT == 0:
             seen = np.atleast_2d(np.cov(np.array(kept).T))
