@@ -30,7 +30,11 @@ def narrow(history: History) -> tuple[Parameter, ...] | str:
     if smallest_mm >= 0.5:
         return "the recorded input is too noisy to show jumps of less than 0.5 mm"
     (jump,) = EFFECT.parameters
-    return (replace(jump, lower=smallest_mm, neutral=smallest_mm if smallest_mm > 0.0 else 0.0),)
+    lowest_mm = max(smallest_mm, 1e-3 * jump.upper)
+    # Sizes closer than this move the last jump of a stroke by less than a sample.
+    apart = history.resolved_mm / max(history.input_span_mm, 1e-300)
+    starts = int(np.clip(np.log(jump.upper / lowest_mm) / max(apart, 1e-300), 8, jump.starts))
+    return (replace(jump, lower=smallest_mm, neutral=smallest_mm if smallest_mm > 0.0 else 0.0, starts=starts),)
 
 
 EFFECT = DriveEffect(

@@ -20,7 +20,7 @@ from fingervision.diagnosis.design.protocols import (
 from fingervision.diagnosis.inference.evidence import surprise
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.posterior import draws
+from fingervision.diagnosis.inference.posterior import LEAST_STEPS, draws
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array
 from fingervision.domain.report import NextRun
@@ -248,7 +248,9 @@ def _promised(
     if worst is None:
         return None
     j, k = separated = worst[1]
-    first, second = (found if each == 0 else draws(choose.problem, listed[each], rng) for each in separated)
+    first, second = (
+        found if each == 0 else draws(choose.problem, listed[each], rng, LEAST_STEPS) for each in separated
+    )
     share = float(odds[j] / (odds[j] + odds[k]))
     both, chance = (listed[j], listed[k]), (share, 1.0 - share)
     gain, interval = expected_gain(

@@ -1,7 +1,7 @@
 """A hypothesis: a set of effects with fitted parameters, and the statistics by which it is judged."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -94,6 +94,7 @@ class Problem:
     form_share: float = SMALL_SHARE
     stalled: frozenset[str] = frozenset()
     mapped: float = 0.0
+    _searched: dict[str, list[tuple[str, Parameter]]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def rows(self) -> int:
@@ -108,8 +109,10 @@ class Problem:
         """Parameters of given effects, with bounds narrowed to the range that the data can show."""
         found: list[tuple[str, Parameter]] = []
         for name in names:
-            searched = self.effects[name].search(self.whitener.history)
-            found += [(name, parameter) for parameter in searched if not isinstance(parameter, str)]
+            if name not in self._searched:
+                searched = self.effects[name].search(self.whitener.history)
+                self._searched[name] = [(name, one) for one in searched if not isinstance(one, str)]
+            found += self._searched[name]
         return found
 
     def only_run(self, column: Array, run: int | None) -> Array:

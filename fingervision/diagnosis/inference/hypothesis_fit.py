@@ -129,7 +129,7 @@ def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Arr
     Parameters
     ----------
     matrix : ndarray of float, shape (p, p)
-        Half the second derivatives.
+        Half the second derivatives, positive definite.
     pull : ndarray of float, shape (p,)
         Half the negative gradient.
     bounds : tuple of ndarray of float, each of shape (p,)
@@ -140,14 +140,14 @@ def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Arr
     ndarray of float, shape (p,)
         The step.
     """
-    step: Array = np.asarray(np.linalg.lstsq(matrix, pull, rcond=1e-12)[0], dtype=np.float64)
+    step: Array = np.asarray(np.linalg.solve(matrix, pull), dtype=np.float64)
     held = np.zeros(pull.size, dtype=bool)
     if not np.any((step < bounds[0]) | (step > bounds[1])):
         return step
     for _ in range(pull.size):
         loose = ~held
         rest = pull[loose] - matrix[np.ix_(loose, held)] @ step[held]
-        step[loose] = np.linalg.lstsq(matrix[np.ix_(loose, loose)], rest, rcond=1e-12)[0]
+        step[loose] = np.linalg.solve(matrix[np.ix_(loose, loose)], rest)
         beyond = loose & ((step < bounds[0]) | (step > bounds[1]))
         if not beyond.any():
             break

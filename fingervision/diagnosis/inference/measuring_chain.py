@@ -115,6 +115,21 @@ class MeasuringChain:
         drives = tuple(effect for effect in effects if isinstance(effect, DriveEffect))
         return drives, tuple(effect for effect in effects if isinstance(effect, PointEffect))
 
+    @cached_property
+    def _late(self) -> frozenset[str]:
+        """Delays, unless the input is a command, or without times."""
+        if self.history.commanded or self.history.time_s is None:
+            return frozenset()
+        return frozenset(effect.name for effect in (*self._stages[0], *self._stages[1]) if is_delay(effect))
+
+    @cached_property
+    def _driven(self) -> dict[object, Response]:
+        """Response of the model without effects, and to the latest drive effects, by the drive effects' parameters.
+
+        Explanations that differ in the effects of mechanism and camera share it.
+        """
+        return {}
+
     def with_input(self, input_mm: Array) -> "MeasuringChain":
         """Replace the recorded input of the measured rows, and of the points of the path that repeat these rows.
 
@@ -141,7 +156,7 @@ class MeasuringChain:
             rows = np.arange(history.input_mm.size) if self.path is None else self.path.rows
             return self._before(effect, acting, rows).respond(_without(effect, acting))
         points = [effect for effect in self._stages[1] if effect.name in acting]
-        response = self.model.respond(self._driven_mm(acting))
+        response = self._answered(acting)
         if self.dynamics is not None and self.dynamics[0] is history.time_s:
             response = response.plus(self.dynamics[1])
         cameras = [effect for effect in points if effect.stage == "camera"]
@@ -159,6 +174,15 @@ class MeasuringChain:
         if not cameras or self.seen_midline_mm is None:
             return first
         return seen(self.midline_mm + self.seen_midline_mm - float(np.median(first.midline_mm)))
+
+    def _answered(self, acting: Settings) -> Response:
+        """Response of the model to the input behind the drive effects."""
+        drives = tuple((one.name, *acting[one.name].items()) for one in self._stages[0] if one.name in acting)
+        if drives not in self._driven:
+            if len(self._driven) > 1:
+                self._driven.popitem()
+            self._driven[drives] = self.model.respond(self._driven_mm(acting))
+        return self._driven[drives]
 
     def driven_mm(self, settings: Settings) -> Array:
         """Input (mm) that the mechanism receives at the measured rows, after the drive effects; shape (n,)."""
@@ -185,7 +209,7 @@ class MeasuringChain:
 
         None for a command, whose path has points between its rows, and for a model that is computed along the path.
         """
-        if self.history.commanded or self.history.time_s is None or self.dynamics is not None:
+        if self._late.isdisjoint(acting) or self.dynamics is not None:
             return []
         if not any(e.memory and not is_delay(e) for e in self._stages[0] if e.name in acting):
             return []

@@ -11,7 +11,7 @@ from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, SMALL_SHARE,
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
 from fingervision.diagnosis.inference.model_adequacy import shapes_of
 from fingervision.diagnosis.inference.probe_basis import Probes
-from fingervision.diagnosis.inference.signatures import Signatures, signatures
+from fingervision.diagnosis.inference.signatures import Signatures, changes, signatures
 
 NOISY = 2.0 * 2.0**0.5
 """Excess of the chi-square of noise over the number of rows n that occurs now and then, in units of sqrt(n): two
@@ -125,7 +125,8 @@ def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: 
         nothing = problem.nothing()
         return SearchState(problem, signatures(problem), nothing, nothing, [nothing], shapes_of(problem))
     problem = problem_beside(None)
-    atoms = signatures(problem)
+    changed = changes(problem)
+    atoms = changed.whitened(problem)
     rough = single_effects(problem, atoms, 4, ROUGH)
     # A pair that is fitted to few samples absorbs their noise, so that the noise would be underestimated.
     many = problem.chain.history.input_mm.size >= SHORT
@@ -133,6 +134,6 @@ def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: 
     first = [*rough[:1], *pairs[:1]]
     if first:
         problem = problem_beside(min(first, key=lambda e: e.bic))
-        atoms = signatures(problem)
+        atoms = changed.whitened(problem)
     nothing = problem.nothing()
     return SearchState(problem, atoms, nothing, nothing, [nothing], shapes_of(problem))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -94,8 +95,30 @@ class Signatures:
         return start
 
 
+Grow = tuple[str, float, float, float, float] | None
+"""Parameter that scales a column nearly linearly: name, neutral value, step, bounds; None if there is none."""
+
+
+class Changes(NamedTuple):
+    """Changes of the prediction, before whitening, that become signatures; the fields are those of `Signatures`."""
+
+    names: tuple[str, ...]
+    starts: tuple[dict[str, float], ...]
+    grows: tuple[Grow, ...]
+    columns_mm: Array
+
+    def whitened(self, problem: Problem) -> Signatures:
+        """Signatures for the noise of a problem."""
+        return Signatures(self.names, self.starts, self.grows, problem.whitener.columns(self.columns_mm)[0])
+
+
 def signatures(problem: Problem) -> Signatures:
     """Compute the signatures: every effect at each of its starting values, in the complete measuring chain."""
+    return changes(problem).whitened(problem)
+
+
+def changes(problem: Problem) -> Changes:
+    """Change of the prediction by every effect at each of its starting values."""
     bare = problem.chain.stacked({})
     names, starts, grows, columns = [], [], [], []
     for name in problem.effects:
@@ -105,7 +128,7 @@ def signatures(problem: Problem) -> Signatures:
         for shape in product(*(p.starting_values() for p in shapes)):
             fixed = {p.name: float(value) for p, value in zip(shapes, shape, strict=True)}
             fixed |= {p.name: float(p.neutral) for p in amplitudes if p.neutral is not None}
-            tried: list[tuple[dict[str, float], tuple[str, float, float, float, float] | None]] = [(fixed, None)]
+            tried: list[tuple[dict[str, float], Grow]] = [(fixed, None)]
             for p in amplitudes:
                 for value in p.starting_values():
                     neutral = float(p.neutral) if p.neutral is not None else 0.0
@@ -120,8 +143,7 @@ def signatures(problem: Problem) -> Signatures:
                     starts.append(start)
                     grows.append(grow)
                     columns.append(column)
-    whitened = problem.whitener.columns(np.stack(columns, axis=1))[0]
-    return Signatures(tuple(names), tuple(starts), tuple(grows), whitened)
+    return Changes(tuple(names), tuple(starts), tuple(grows), np.stack(columns, axis=1))
 
 
 def start_patterns(history: History) -> tuple[dict[str, float], ...]:

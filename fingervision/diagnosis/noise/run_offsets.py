@@ -9,6 +9,8 @@ from fingervision.domain.effect import Array
 
 SPREADS = np.concatenate([[0.0], np.geomspace(0.01, 1e4, 121)])
 """Spreads of the run offsets that are tried, relative to the noise."""
+WIDTHS = np.gradient(SPREADS)
+"""Width of the interval that each of these spreads represents."""
 MIDLINE_FREE_MM = 1e3
 """Prior spread of the midline's constant: large enough to be free."""
 
@@ -45,6 +47,7 @@ class RunOffsets:
     drawn: int = 0
     _metrics: dict[tuple[float, ...], Array] = field(default_factory=dict, init=False, repr=False)
     _by_spread: list[tuple[Array, Array, Array]] = field(default_factory=list, init=False, repr=False)
+    _beside_drawn: list[Array] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Tabulate, for each channel and each spread, the quantities that do not depend on the residual.
@@ -57,6 +60,10 @@ class RunOffsets:
             spread = (scale * SPREADS)[:, None] ** 2 * z
             penalty = np.sum(np.log1p(spread), axis=1) + 2.0 * np.log1p(SPREADS**2)
             self._by_spread.append((z, z * spread / (1.0 + spread), penalty))
+        if self.drawn:
+            inner = self.gram[-self.drawn :, -self.drawn :] + np.eye(self.drawn)
+            apart = np.linalg.solve(inner, self.gram[-self.drawn :]).T
+            self._beside_drawn.append(np.asarray(apart, dtype=np.float64))
 
     @classmethod
     def of(cls, whitener: Whitener) -> "RunOffsets":
@@ -139,10 +146,10 @@ class RunOffsets:
         """
         if self.runs == 1:
             return (0.0,) * self.channels, 0.0, 0.0
-        tried, width, doubt = self._tried(residual), np.gradient(SPREADS), 0.0
+        tried, doubt = self._tried(residual), 0.0
         for _, determinant, gain in tried:
             cost = determinant - gain
-            doubt -= 2.0 * float(np.log(np.sum(width * np.exp(-0.5 * (cost - cost.min())))))
+            doubt -= 2.0 * float(np.log(np.sum(WIDTHS * np.exp(-0.5 * (cost - cost.min())))))
         return *self._likeliest(tried), doubt
 
     def _likeliest(self, tried: list[tuple[float, Array, Array]]) -> tuple[tuple[float, ...], float]:
@@ -159,21 +166,19 @@ class RunOffsets:
 
         With a few runs only, the spread of the offsets is very uncertain.
         """
-        width = np.gradient(SPREADS)
         out = []
         for scale, determinant, gain in self._tried(residual):
             cost = determinant - gain
-            weight = width * np.exp(-0.5 * (cost - cost.min()))
+            weight = WIDTHS * np.exp(-0.5 * (cost - cost.min()))
             out.append(scale * float(rng.choice(SPREADS, p=weight / weight.sum())))
         return tuple(out)
 
     def _tried(self, residual: Array) -> list[tuple[float, Array, Array]]:
         """Scale of each channel; for all spreads, the penalty and the reduction of chi-square due to offsets."""
         shares = self.design.T @ residual
-        if self.drawn:
+        for columns in self._beside_drawn:
             # The part that the drawing's uncertain dimensions explain is not scatter between runs.
-            inner = self.gram[-self.drawn :, -self.drawn :] + np.eye(self.drawn)
-            shares = shares - self.gram[:, -self.drawn :] @ np.linalg.solve(inner, shares[-self.drawn :])
+            shares = shares - columns @ shares[-self.drawn :]
         found = []
         for channel, (z, weight, penalty) in enumerate(self._by_spread):
             mean = shares[channel * self.runs : (channel + 1) * self.runs] / z
