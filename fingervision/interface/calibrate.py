@@ -7,27 +7,26 @@ from typing import Any
 
 from calib.board import Board, find_corners
 from calib.calibration_picture import picture_of_corners, picture_of_edges, picture_of_lines
-from calib.known_widths import find_widths
 from calib.limits import Limits
 from calib.line_scale import find_lines
 from calib.measured_scale import Calibration as MeasuredScale
 from calib.measured_scale import Reference as Certified
 from calib.scale_from_board import scale_from_board
 from calib.scale_from_lines import scale_from_lines
-from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
+from calib.scale_from_sizes import scale_from_sizes
 from fingervision import __version__
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError
 from fingervision.frames.array_levels import what_it_is
 from fingervision.interface.argument_checks import number, one_of, region_of, speaks_python
 from fingervision.interface.calibration import Calibration, board_lines, line_details, line_lines, sizes_lines
 from fingervision.interface.reference_pictures import (
-    PictureResponse,
     Reference,
     files_of,
     known_sizes,
     read_pictures,
     references_of,
 )
+from fingervision.measuring.picture_response import PictureResponse, read_sizes
 
 # Limits of the set-up that enter the uncertainty (plane, tilt, temperature), with defaults for those not stated.
 
@@ -86,16 +85,10 @@ def on_sizes(
     """Calibrate on bars and slots of known size."""
     stored = known_sizes(references, u_size_mm)
     read_with = PictureResponse.of(noted.response, files_of([each.source for each in references]))
-    pictures = [replace(picture, grey=read_with.light(picture.grey)) for picture in stored]
-    bench, stated = limits_from(limits, lens_calibrated=False)
-    edges = find_widths(pictures, region)
-    shift_px = read_with.shift_px(stored, edges, region)
-    sizes = [
-        MeasuredSize.of(picture, edge, noted.certificate, noted.date)
-        for picture, edge in zip(pictures, edges, strict=True)
-    ]
-    height, width = pictures[0].grey.shape
-    fit = scale_from_sizes(sizes, (width, height), bench, stated, 0.0 if read_with.is_known else shift_px)
+    bench, stated_limits = limits_from(limits, lens_calibrated=False)
+    edges, sizes, shift_px = read_sizes(stored, region, read_with, noted.certificate, noted.date)
+    height, width = stored[0].grey.shape
+    fit = scale_from_sizes(sizes, (width, height), bench, stated_limits, 0.0 if read_with.is_known else shift_px)
     details = {
         "bias_known": fit.bias_known,
         "chi_square": fit.chi_square,

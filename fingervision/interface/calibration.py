@@ -12,7 +12,7 @@ from calib.gauge_study import Agreement
 from calib.known_widths import KnownSize, find_widths
 from calib.measured_scale import Calibration as MeasuredScale
 from fingervision.interface.argument_checks import path_of, region_of, speaks_python
-from fingervision.interface.reference_pictures import PictureResponse
+from fingervision.measuring.picture_response import PictureResponse
 from fingervision.storage.calibration_json import read_calibration, refuse_foreign, write_calibration, write_picture
 
 if TYPE_CHECKING:

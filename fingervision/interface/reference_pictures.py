@@ -2,9 +2,9 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,112 +22,6 @@ from fingervision.frames.image_file import UnreadableImageError, is_image, read_
 from fingervision.frames.source import open_source
 from fingervision.interface.argument_checks import number, one_of
 from fingervision.vision.grey import GreyImage, to_grey
-
-if TYPE_CHECKING:
-    from calib.camera_response import CameraResponse
-    from calib.known_widths import KnownSize
-    from calib.measured_scale import Calibration
-    from calib.parallel_edges import ParallelEdges
-    from fingervision.vision.grey import GreyImage
-
-
-# The camera response assumed for calibration pictures, and how far another response would move their edges.
-
-
-@dataclass(frozen=True, slots=True)
-class PictureResponse:
-    """The response (grey level against light) with which pictures are read.
-
-    Parameters
-    ----------
-    response, other : CameraResponse
-        The response that is used, and the alternative standard response.
-    is_known : bool
-        Whether the user stated it.
-    """
-
-    response: "CameraResponse"
-    other: "CameraResponse"
-    is_known: bool
-
-    @classmethod
-    def of(cls, words: str, files: Sequence[Path]) -> "PictureResponse":
-        """Choose the response by the option --response.
-
-        `auto` takes the tag of the pictures, or a linear response if they have none. A picture without a tag, such as
-        a frame saved as PNG, may be of the same camera as one with a tag.
-
-        Raises
-        ------
-        DataError
-            The tags of two pictures differ.
-        """
-        from calib.camera_response import standard_response
-        from fingervision.frames.transfer_tag import transfer_tag
-        from fingervision.storage.response_csv import response_named
-
-        stated = response_named(words)
-        tags = {tag: file for file in files if stated is None and (tag := transfer_tag((file,))) is not None}
-        if len(tags) > 1:
-            found = " and ".join(f"{tag} in {file.name}" for tag, file in tags.items())
-            raise DataError(
-                f"All pictures must state the same camera response, but they state {found}: take them with the same "
-                "settings, or give the response with --response."
-            )
-        response = stated or standard_response(next(iter(tags), "linear"))
-        other = standard_response("srgb" if response.name == "linear" else "linear")
-        return cls(response, other, stated is not None)
-
-    @classmethod
-    def of_calibration(cls, calibration: "Calibration") -> "PictureResponse":
-        """Use the response with which a calibration was made."""
-        from calib.camera_response import standard_response
-
-        response = calibration.camera_response or standard_response("linear")
-        return cls(response, response, calibration.response_known)
-
-    def light(self, grey: "GreyImage") -> "GreyImage":
-        """Convert a picture to light; a linear response leaves the levels unchanged."""
-        return _light(self.response, grey)
-
-    def shift_px(
-        self,
-        stored: Sequence["KnownSize"],
-        edges: Sequence["ParallelEdges"],
-        region: tuple[int, int, int, int] | None,
-    ) -> float:
-        """Mean width (px) by which a light gap appears wider with this response than with the alternative response."""
-        from calib.errors import CalibrationError
-        from calib.parallel_edges import measure_parallel_edges
-
-        shifts = []
-        for picture, edge in zip(stored, edges, strict=True):
-            levels = _light(self.other, picture.grey).astype(float)
-            try:
-                ends = (edge.edges_px[0][[0, -1]], edge.edges_px[1][[0, -1]])
-                again = measure_parallel_edges(levels, ends, edge.light)
-            except CalibrationError:
-                continue
-            shifts.append((edge.width_px - again.width_px) * (1.0 if edge.light else -1.0))
-        return sum(shifts) / len(shifts) if shifts else 0.0
-
-    def noted(self, calibration: "Calibration", shift_px: float) -> "Calibration":
-        """Store in a calibration the response with which its pictures were read."""
-        return replace(
-            calibration,
-            camera_response=self.response,
-            response_known=self.is_known,
-            response_shift_px=shift_px,
-        )
-
-
-def _light(response: "CameraResponse", grey: "GreyImage") -> "GreyImage":
-    from fingervision.vision.grey import top_level
-
-    if response.name == "linear":
-        return grey
-    return response.linearised(grey, response.top_level or top_level(grey))
-
 
 KINDS = ("bar", "slot")
 ARGUMENT = "pictures"
@@ -269,4 +163,4 @@ def _first_frame(path: Path) -> Pixels:
     raise DataError(f"The video {path} must have a frame that can be decoded, but has none: record it again.")
 
 
-__all__ = ["KINDS", "PictureResponse", "Reference", "files_of", "known_sizes", "read_pictures", "references_of"]
+__all__ = ["KINDS", "Reference", "files_of", "known_sizes", "read_pictures", "references_of"]

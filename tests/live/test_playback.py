@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
+import fingervision as fv
 from calib.calibration import BareScale
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
@@ -173,6 +174,40 @@ def test_what_ends_is_a_recording_and_what_goes_on_is_none(recordings: dict[str,
 def playback(recordings: dict[str, Path], tmp_path: Path) -> Playback:
     """A recording without a scale, so that no measurement runs in the background."""
     return Playback(recorded(str(recordings["images"]), 25.0, Choices(), ()), tmp_path / "out")
+
+
+def test_a_calibration_on_the_page_is_that_of_the_command(tmp_path: Path) -> None:
+    widths_px, size_mm = (68.4, 136.8), (2.0, 4.0)
+    rng = np.random.default_rng(8)
+    for number, width_px in enumerate(widths_px):
+        light = np.full((240, 320), 200.0)
+        half = 4 * width_px / 2
+        wide = np.full((240, 4 * 320), 200.0)
+        wide[:, round(4 * 160 - half) : round(4 * 160 + half)] = 40.0
+        light = cv2.GaussianBlur(wide.reshape(240, 320, 4).mean(axis=2), (0, 0), 1.2)
+        cv2.imwrite(
+            str(tmp_path / f"{number}.png"), np.round(light + rng.normal(0.0, 1.0, light.shape)).astype(np.uint8)
+        )
+    view = Playback(recorded(str(tmp_path / "*.png"), 25.0, Choices(), ()), tmp_path / "out")
+    view.start()
+    try:
+        ask = {"do": "calibrate", "kind": "bar", "u_size_mm": 0.001, "box": [0, 0, 320, 240], "sure": True}
+        for number in (0, 1):
+            obey(view, {"do": "seek", "frame": number})
+            until(lambda number=number: view.seen is not None and view.seen.frame.index == number)
+            obey(view, {**ask, "size_mm": size_mm[number], "more": number == 0})
+        pair = view.choices.scale
+        obey(view, {**ask, "size_mm": size_mm[1]})
+        single = view.choices.scale
+    finally:
+        view.stop()
+    pictures = {tmp_path / f"{number}.png": size_mm[number] for number in (0, 1)}
+    for found, references in ((pair, pictures), (single, {tmp_path / "1.png": size_mm[1]})):
+        wanted = fv.calibrate("bar", references, u_size_mm=0.001, roi=(0, 0, 320, 240)).scale
+        assert found.px_per_mm == wanted.px_per_mm
+        np.testing.assert_array_equal(found.covariance, wanted.covariance)
+        assert found.response_shift_px == wanted.response_shift_px != 0.0
+        assert {part.source for part in found.parts} == {part.source for part in wanted.parts}
 
 
 def test_wrong_wishes_are_refused_in_a_sentence(playback: Playback) -> None:

@@ -5,7 +5,6 @@ import io
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from threading import Event, Thread
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -19,10 +18,11 @@ from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.playback import track
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
-from fingervision.live.server import Page, bound
 from fingervision.measuring.scale import stated_scale
 from fingervision.rendering import Camera, render, two_fingers
-from tests.live.browser import browser, drag, needs_chromium, opened, shown
+from fingervision.storage.calibration_json import read_calibration
+from tests.live.browser import browser, drag, needs_chromium, opened, says, shown
+from tests.live.conftest import serving
 
 __all__ = ["browser", "opened"]
 pytestmark = [needs_chromium, pytest.mark.slow]
@@ -61,14 +61,10 @@ def measured_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def served(frames: Path, tmp_path: Path) -> Iterator[str]:
     """Address of the page of the recording."""
     view = Playback(recorded(str(frames), RATE_HZ, Choices(scale=BareScale(PX_PER_MM)), ()), tmp_path / "out")
-    page, end = Page(view, bound("127.0.0.1", 0)), Event()
-    view.start()
-    serving = Thread(target=page.serve, args=(end,), daemon=True)
-    serving.start()
-    yield page.address
-    end.set()
-    serving.join()
-    view.stop()
+    with serving(view) as page:
+        view.start()
+        yield page.address
+        view.stop()
 
 
 def typed(page: Any, field: str, words: str) -> None:
@@ -198,14 +194,10 @@ def modelled(frames: Path, tmp_path: Path) -> Iterator[str]:
     comparison = Comparison(view, model)
     view.features["model"] = comparison
     view.on_table = comparison.add_all
-    page, end = Page(view, bound("127.0.0.1", 0)), Event()
-    view.start()
-    serving = Thread(target=page.serve, args=(end,), daemon=True)
-    serving.start()
-    yield page.address
-    end.set()
-    serving.join()
-    view.stop()
+    with serving(view) as page:
+        view.start()
+        yield page.address
+        view.stop()
 
 
 def dragged(page: Any, chart: str, shares: tuple[float, float], *, shift: bool = False) -> None:
@@ -337,3 +329,50 @@ def test_numbers_are_taken_as_people_type_them_and_what_is_refused_goes_with_its
     assert "at least 8 each way" in page.inner_text("#hint")
     drag(page, (10, 10, 300, 220))
     shown(page, "document.querySelector('#region_w').value === '300'")
+
+
+BARS_MM, BAR_PX_PER_MM, BAR_LEFT_PX = (2.0, 3.0, 4.0), 34.0, 80
+
+
+@pytest.fixture
+def of_bars(tmp_path: Path) -> Iterator[str]:
+    """Address of the page of a recording that shows a bar of another width in each frame, and has no scale."""
+    folder = tmp_path / "bars"
+    folder.mkdir()
+    rng = np.random.default_rng(4)
+    for number, size_mm in enumerate(BARS_MM):
+        picture = np.full((240, 320), 200.0)
+        picture[:, BAR_LEFT_PX : BAR_LEFT_PX + round(size_mm * BAR_PX_PER_MM)] = 40.0
+        picture = cv2.GaussianBlur(picture, (0, 0), 1.2) + rng.normal(0.0, 1.0, picture.shape)
+        cv2.imwrite(str(folder / f"{number}.png"), np.round(picture).astype(np.uint8))
+    view = Playback(recorded(str(folder), RATE_HZ, Choices(), ()), tmp_path / "out")
+    with serving(view) as page:
+        view.start()
+        yield page.address
+        view.stop()
+
+
+def test_a_scale_is_found_by_dragging_over_references_in_several_frames(
+    of_bars: str, opened: Callable[..., Any], tmp_path: Path
+) -> None:
+    page = opened(of_bars, viewport={"width": 1280, "height": 720})
+    shown(page, "Number(document.querySelector('#picture').dataset.shown) > 0")
+    for number, size_mm in enumerate(BARS_MM):
+        before = int(page.get_attribute("#picture", "data-shown")) if number else 0
+        typed(page, "#go_frame", str(number))
+        shown(page, f"Number(document.querySelector('#picture').dataset.shown) > {before}")
+        page.click("#drag_reference")
+        drag(page, (BAR_LEFT_PX - 40, 60, round(size_mm * BAR_PX_PER_MM) + 80, 100))
+        page.fill("#size_mm", f"{size_mm:g} mm")
+        if number < len(BARS_MM) - 1:
+            page.click("#more_references")
+            page.locator("#references", has_text=f"in frame {number}").wait_for()
+    page.press("#size_mm", "Enter")
+    says(page, "Calibrated: ")
+    (path,) = (tmp_path / "out").glob("calibration_*.json")
+    found = read_calibration(path)
+    assert found.px_per_mm == pytest.approx(BAR_PX_PER_MM, abs=2.0 * found.covariance[0, 0] ** 0.5)
+    assert len(found.references) == len(BARS_MM)
+    # Three sizes determine the edge bias, so that no limit of it remains in the budget.
+    assert "edge bias" not in {part.source for part in found.parts}
+    assert page.locator("#references_bar").is_hidden()

@@ -1,6 +1,7 @@
 """Requests about measurement and display: region, tip direction, height, scale, zero, tolerance, step pictures."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
@@ -9,17 +10,18 @@ from typing import Any
 import cv2
 
 from calib.errors import CalibrationError
-from calib.known_widths import KnownSize, find_widths
+from calib.known_widths import KnownSize
 from calib.limits import Limits
-from calib.measured_scale import Calibration, Reference
+from calib.measured_scale import Calibration
 from calib.scale_from_sizes import MeasuredSize, scale_from_sizes
 from fingervision import __version__
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, NoCalibrationError, OutputError, StateError, UsageError
-from fingervision.domain.frame import Frame, Region
+from fingervision.domain.frame import Region
 from fingervision.domain.gap import GapMeasurement
 from fingervision.live.commands.asking import Answer, Request, box, check_scale, number, number_or_none, seen_of, shown
 from fingervision.live.view import View
+from fingervision.measuring.picture_response import PictureResponse, read_sizes
 from fingervision.measuring.scale import stated_scale
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.out_folder import make_out_folder
@@ -27,45 +29,68 @@ from fingervision.vision.grey import to_grey
 from fingervision.vision.overlay import in_eight_bits
 from fingervision.vision.pipeline import steps
 
-# Calibration from a reference object in the live picture, whose region and size the user states.
+# Calibration from reference objects in pictures of the view, whose regions and sizes the user states.
+
+REFERENCES = "references"
 
 
-NAME = "the live picture"
-
-
-def calibrated(frame: Frame, region: Region, kind: str, size_mm: float, u_size_mm: float) -> Calibration:
-    """Calibrate on one bar or slot in a rectangle of the picture.
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenReference:
+    """A bar or slot of known size, measured in one picture of the view.
 
     Parameters
     ----------
-    frame : Frame
-        The picture.
-    region : Region
-        Rectangle that contains the reference object.
-    kind : str
-        "bar" or "slot".
-    size_mm, u_size_mm : float
-        Size of the reference object, and the standard uncertainty of this size.
+    frame : int
+        Number of the frame.
+    size : MeasuredSize
+        Certified and measured size.
+    shift_px : float
+        Width by which a light gap appears wider than with another usual camera response.
+    read_with : PictureResponse
+        Camera response with which the picture was read.
+    """
 
-    Returns
-    -------
-    Calibration
-        Calibration from a single size, so that the uncorrected edge bias is a contribution to the budget.
+    frame: int
+    size: MeasuredSize
+    shift_px: float
+    read_with: PictureResponse
+
+
+def seen_reference(view: View, region: Region, kind: str, size_mm: float, u_size_mm: float) -> SeenReference:
+    """Measure the reference object in a rectangle of the displayed picture, as `calibrate bar|slot` does.
 
     Raises
     ------
     NoCalibrationError
         The part of the picture shows no reference of that kind.
     """
+    frame = seen_of(view).frame
     try:
-        picture = KnownSize(NAME, kind, size_mm, u_size_mm, to_grey(frame.pixels).copy())
+        known = KnownSize(f"in frame {frame.index}", kind, size_mm, u_size_mm, to_grey(frame.pixels).copy())
+        read_with = PictureResponse.of("auto", view.description.files)
         box = (region.x_px, region.y_px, region.width_px, region.height_px)
-        (edges,) = find_widths((picture,), box)
-        reference = Reference(f"{kind} in the live picture", size_mm, u_size_mm, "", "")
-        size = MeasuredSize(reference, edges.width_px, edges.u_width_px, edges.points_px, edges.light)
-        return scale_from_sizes((size,), (frame.width_px, frame.height_px), Limits()).calibration
+        _, (size,), shift_px = read_sizes((known,), box, read_with)
     except CalibrationError as error:
         raise NoCalibrationError(str(error)) from error
+    return SeenReference(frame.index, size, shift_px, read_with)
+
+
+def calibrated(references: Sequence[SeenReference], frame_size_px: tuple[int, int]) -> Calibration:
+    """Calibrate on references; three sizes, or a bar and a slot, determine the edge bias too.
+
+    Raises
+    ------
+    NoCalibrationError
+        The sizes contradict each other.
+    """
+    read_with = references[0].read_with
+    shift_px = sum(each.shift_px for each in references) / len(references)
+    try:
+        sizes = [each.size for each in references]
+        found = scale_from_sizes(sizes, frame_size_px, Limits(), response_shift_px=shift_px).calibration
+    except CalibrationError as error:
+        raise NoCalibrationError(str(error)) from error
+    return read_with.noted(found, shift_px)
 
 
 POLARITIES = ("auto", "dark", "light")
@@ -155,9 +180,15 @@ def _calibrate(view: View, request: Request) -> Answer:
     kind = request.get("kind")
     if kind not in ("bar", "slot"):
         raise UsageError(f"The reference object must be a bar or a slot, but is {shown(kind)}.")
-    found = calibrated(
-        seen_of(view).frame, box(request), str(kind), number(request, "size_mm"), number(request, "u_size_mm")
-    )
+    seen = seen_reference(view, box(request), str(kind), number(request, "size_mm"), number(request, "u_size_mm"))
+    references = [*view.features.get(REFERENCES, ()), seen]
+    found = calibrated(references, (view.description.width_px, view.description.height_px))
+    if request.get("more"):
+        view.features[REFERENCES] = references
+        return Answer(
+            f"The {kind} is {seen.size.width_px:.3f} px wide in frame {seen.frame}: mark another reference, also in "
+            "another frame."
+        )
     check_scale(view, found.px_per_mm, request)
     made_at = datetime.now(UTC).isoformat(timespec="seconds")
     camera = dict(view.description.camera)
@@ -170,6 +201,7 @@ def _calibrate(view: View, request: Request) -> Answer:
     except FingervisionError:
         path.unlink(missing_ok=True)
         raise
+    view.features.pop(REFERENCES, None)
     u = found.covariance[0, 0] ** 0.5
     return Answer(f"Calibrated: {found.px_per_mm:.4f} px/mm, u {u:.4f} px/mm; written to {path}.")
 
@@ -204,6 +236,19 @@ def _steps(view: View, request: Request) -> Answer:
     )
 
 
+def _forget_references(view: View, request: Request) -> Answer:
+    view.features.pop(REFERENCES, None)
+    return Answer()
+
+
+def section(view: View) -> dict[str, Any]:
+    """Return the references that are kept for a calibration, for the browser page."""
+    kept = [each.size for each in view.features.get(REFERENCES, ())]
+    return {
+        REFERENCES: [f"{each.reference.what}: {each.reference.size_mm:g} mm = {each.width_px:.2f} px" for each in kept]
+    }
+
+
 COMMANDS = {
     "region": _region,
     "tips": _tips,
@@ -214,6 +259,7 @@ COMMANDS = {
     "limits": _limits,
     "scale": _scale,
     "calibrate": _calibrate,
+    "forget_references": _forget_references,
     "steps": _steps,
 }
 HARMLESS = frozenset({"steps"})

@@ -66,7 +66,7 @@ export function submit(id, act, restore) {
   form.noValidate = true; // the server says in a sentence what is missing
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    const request = act();
+    const request = act(event.submitter || form);
     if (request) asks(request);
   });
 }

@@ -34,7 +34,9 @@ panel("scaling", 'Scale: <span id="scale" class="quiet">not known</span>', `
     <label>u (k = 1) <input id="u_size_mm" type="text" inputmode="decimal" autocomplete="off" value="0.001" required> mm</label>
     <button id="drag_reference" type="button" aria-pressed="false">Drag over it</button>
     <button>Calibrate</button>
-  </form>`, { open: true, order: 30 });
+    <button id="more_references" value="more" title="Keep this reference, and mark another one, also in another frame: three sizes, or a bar and a slot, determine the edge bias">Keep, and mark another</button>
+  </form>
+  <div id="references_bar" class="row" hidden><span id="references" class="quiet"></span><button id="forget_references">Forget</button></div>`, { open: true, order: 30 });
 
 const rounded = (value) => (value === null ? null : Number(value.toPrecision(7)));
 on("drag_region", "click", () => wantBox("drag_region", "Drag over the part of the picture to look at.", (box) => ask({ do: "region", box })));
@@ -54,14 +56,17 @@ submit("limits_form", () => ({ do: "limits", least: number("least"), greatest: n
   inForce({ least: (state) => state.least_mm, greatest: (state) => state.greatest_mm }));
 submit("scale_form", () => ({ do: "scale", px_per_mm: number("px_per_mm"), u_px_per_mm: number("u_px_per_mm") }),
   inForce({ px_per_mm: (state) => rounded(state.px_per_mm), u_px_per_mm: (state) => rounded(state.u_px_per_mm) }));
-submit("calibrate_form", () => {
+on("forget_references", "click", () => ask({ do: "forget_references" }));
+submit("calibrate_form", (pressed) => {
   const box = shown.box || (page.state && [0, 0, page.state.width_px, page.state.height_px]);
   shown.box = null;
   at("hint").textContent = "";
-  return { do: "calibrate", box, kind: at("kind").value, size_mm: number("size_mm"), u_size_mm: number("u_size_mm") };
+  return { do: "calibrate", more: pressed.id === "more_references", box, kind: at("kind").value, size_mm: number("size_mm"), u_size_mm: number("u_size_mm") };
 });
 listen("state", (state) => {
   const u = state.u_px_per_mm === null ? " px/mm (no uncertainty)" : ` ± ${(2 * state.u_px_per_mm).toFixed(4)} px/mm (k = 2)`;
   say("scale", state.px_per_mm === null ? "not known" : `${state.px_per_mm.toFixed(4)}${u}`);
+  at("references_bar").hidden = !state.references.length;
+  say("references", `Kept: ${state.references.join("; ")}`);
   if (document.activeElement !== at("tips")) at("tips").value = state.tips;
 });
