@@ -2,6 +2,7 @@
 
 import ast
 import importlib
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -23,6 +24,25 @@ def test_every_public_name_is_there(package) -> None:
     with pytest.raises(AttributeError):
         _ = package.no_such_name
     assert len(set(package.__all__)) == len(package.__all__)
+
+
+def test_every_public_name_can_be_the_first_that_is_used() -> None:
+    # Each in a fork before anything of the package is loaded: what is imported in a circle works in one order only.
+    program = (
+        "import os, sys, fingervision\n"
+        "first = {home: name for name, home in fingervision._HOMES.items()}\n"
+        "for home, name in first.items():\n"
+        "    child = os.fork()\n"
+        "    if not child:\n"
+        "        getattr(fingervision, name)\n"
+        "        os._exit(0)\n"
+        "    if os.waitpid(child, 0)[1]:\n"
+        "        sys.exit(home)\n"
+    )
+    if not hasattr(os, "fork"):
+        pytest.skip("This system starts no process as a copy of another.")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)

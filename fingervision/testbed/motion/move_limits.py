@@ -3,6 +3,9 @@
 from dataclasses import dataclass, replace
 from math import inf
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fingervision.domain.errors import LimitError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import StageLimits
@@ -105,6 +108,9 @@ PUBLISHED_KEYS = LIMIT_KEYS[:5]
 
 # Soft limits: the range allowed for recipes and jogs, within the limits of the actuator.
 
+# Positions at which the model is computed, and their margin beyond the limits: readings may lie beyond them.
+POSITIONS, BEYOND_MM = 201, 0.06
+
 
 @dataclass(frozen=True, slots=True)
 class SoftLimits:
@@ -127,6 +133,11 @@ class SoftLimits:
     speed_mm_s: float
     force_n: float
     gap_mm: float = 0.0
+
+    @property
+    def tabulated_mm(self) -> NDArray[np.float64]:
+        """Positions at which a model is tabulated, in mm, shape (n,)."""
+        return np.linspace(self.lower_mm - BEYOND_MM, self.upper_mm + BEYOND_MM, POSITIONS)
 
     def within(self, able: StageLimits) -> "SoftLimits":
         """Narrow the limits to those of an actuator."""

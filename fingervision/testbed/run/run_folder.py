@@ -33,7 +33,6 @@ from fingervision.storage.simulation_table import write_simulation
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.motion.move_limits import SoftLimits
-from fingervision.testbed.run.safety_monitor import inputs_within
 from fingervision.testbed.run.synchronised_acquisition import Sight
 from fingervision.testbed.simulation.injected_effects import Hidden
 
@@ -49,7 +48,7 @@ def digest_of(bed: Bed, hidden: Hidden) -> str:
 
 def write_expected(path: Path, model: Model, limits: SoftLimits) -> None:
     """Write the gap that the model predicts within the test bed's limits."""
-    inputs = inputs_within(limits)
+    inputs = limits.tabulated_mm
     # The force is left out, because it depends on the object between the fingers, not only on the gripper.
     write_simulation(path, inputs, replace(model.respond(inputs), force_n=None))
 

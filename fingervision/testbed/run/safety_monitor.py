@@ -6,7 +6,6 @@ from math import inf, sqrt
 from time import sleep
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.domain.frame import LostFrame
@@ -29,13 +28,6 @@ margin; units that are confused differ by 10, 25.4, 100 or 1000."""
 FEWEST, SURE = 5, 30.0
 """Frames, and standard deviations, from which on a ratio counts: Student's t with three degrees of freedom exceeds 30
 by chance four times in 100 000."""
-# Positions at which the model is computed, and their margin beyond the limits: readings may lie beyond them.
-POSITIONS, BEYOND_MM = 201, 0.06
-
-
-def inputs_within(limits: SoftLimits) -> NDArray[np.float64]:
-    """Positions at which the model is tabulated, in mm, shape (n,)."""
-    return np.linspace(limits.lower_mm - BEYOND_MM, limits.upper_mm + BEYOND_MM, POSITIONS)
 
 
 class MotionRatio:
@@ -50,7 +42,7 @@ class MotionRatio:
     """
 
     def __init__(self, model: Model, limits: SoftLimits) -> None:
-        self._inputs_mm = inputs_within(limits)
+        self._inputs_mm = limits.tabulated_mm
         self._gaps_mm = model.respond(self._inputs_mm).gap_mm
         self.begin()
 
