@@ -26,7 +26,7 @@ MOST_BEHIND = 12
 SAME_MOTION = 0.1
 """Largest difference of two columns of one motion, as a share of the range."""
 NEVER = -100
-"""Points of a column without numbers, which is not suggested."""
+"""Points of a column without numbers, and of times for any other role, which are not suggested."""
 READINGS = frozenset(
     [
         "actual",
@@ -129,6 +129,9 @@ def _points(column: RawColumn, name: ColumnName, role: str, decimal: str) -> int
     unit = spelled(column.unit) or name.unit
     values = values_of(column, decimal)[:LOOKED_AT]
     is_constant = values.size > 0 and bool(np.ptp(values) == 0.0)
+    is_time = "time" in found - {role} or factor(unit, "time") is not None or not values.size
+    if role in DIMENSION and role != "time" and is_time:
+        return NEVER
     is_sized = unit != "" and factor(unit, DIMENSION.get(role, "length")) is not None
     if is_sized or known_unit(unit) is not None:
         points += BY_UNIT if is_sized else -2 * BY_UNIT

@@ -68,3 +68,17 @@ def test_times_since_an_origin_are_times(tmp_path: Path) -> None:
     time_s = read_measured_table(table).time_s
     assert time_s is not None
     assert time_s[-1] - time_s[0] == pytest.approx(3.9)
+
+
+@pytest.mark.parametrize("header", ["time_s,input_mm", "Zeit [ms],Weg [mm]", "Date,Position [mm]"])
+def test_times_are_never_suggested_as_the_gap_that_a_table_lacks(header: str, tmp_path: Path) -> None:
+    dates = header.startswith("Date")
+    times = [f"2026-03-01 10:00:{k:02d}" if dates else f"{0.1 * k:.1f}" for k in range(40)]
+    table = tmp_path / "drive.csv"
+    table.write_text("\n".join([header, *(f"{t},{0.05 * (k % 9):.2f}" for k, t in enumerate(times))]), encoding="utf-8")
+    with pytest.raises(OpenQuestionError) as caught:
+        read_measured_table(table)
+    keys = [each.key for question in caught.value.questions for each in question.readings]
+    named = header.split(",")[0]
+    assert [key for key in keys if key.startswith("columns.gap=")]
+    assert f"columns.gap={named}" not in keys
