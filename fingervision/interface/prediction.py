@@ -28,8 +28,8 @@ from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model, disagreements, kinds, small_displacements_alone
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
+from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import MechanismDrawing, is_mechanism, read_drawing
 from fingervision.storage.out_folder import own_folder
@@ -419,7 +419,7 @@ def _built(name: str, mechanism: Mechanism) -> MechanismModel:
         return MechanismPlate(mechanism)
     if name == "lumped":
         return MechanismFrame(mechanism)
-    return MechanismChain(mechanism)
+    return RigidBodies(mechanism)
 
 
 def _mechanism_inputs(driven: Array | None, at_yield_mm: float, touching: Iterable[float], *, is_curved: bool) -> Array:

@@ -10,8 +10,8 @@ from fingervision.domain.errors import ModelError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import Part
 from fingervision.models.lumped import MechanismFrame
-from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, out_of_plane
+from fingervision.models.rigid_bodies import RigidBodies
 
 # Effects of weight, temperature and a part between two probes on a mechanism, for small displacements.
 #
@@ -169,7 +169,7 @@ class GrippedPair:
         return PairGrip(input_mm, free_mm + grip * self.compliance_mm_n, grip, force, model.peak_stress(moved).mpa)
 
 
-MechanismModel = MechanismPlate | MechanismFrame | MechanismChain
+MechanismModel = MechanismPlate | MechanismFrame | RigidBodies
 
 
 def response_figures(model: MechanismModel) -> dict[str, float]:
@@ -177,7 +177,7 @@ def response_figures(model: MechanismModel) -> dict[str, float]:
 
     Parameters
     ----------
-    model : MechanismPlate, MechanismFrame or MechanismChain
+    model : MechanismPlate, MechanismFrame or RigidBodies
         Model of the drawing.
 
     Returns
@@ -221,7 +221,7 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
 
     Parameters
     ----------
-    model : MechanismPlate, MechanismFrame or MechanismChain
+    model : MechanismPlate, MechanismFrame or RigidBodies
         Model of the drawing.
 
     Returns

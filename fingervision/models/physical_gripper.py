@@ -28,9 +28,9 @@ from fingervision.models.kinds import build_model
 from fingervision.models.laws import laws_of
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_figures import MechanismModel
 from fingervision.models.place_answers import PlaceAnswers
+from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.models.small_answer import DrawnAnswer, SmallAnswer, ratio_curves, small_answer
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
@@ -186,7 +186,7 @@ class MechanismModelOfGap:
         if kind == "finite_element":
             model = MechanismPlate(mechanism)
         elif kind == "stiffness_matrix":
-            model = MechanismChain(mechanism)
+            model = RigidBodies(mechanism)
         elif kind == "lumped":
             model = MechanismFrame(mechanism)
         else:

@@ -12,7 +12,7 @@ from fingervision.domain.errors import DataError, ModelError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_chain import MechanismChain
+from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.mechanism_toml import read_mechanism
 
 E, NU, PLATE_MM = 1000.0, 0.3, 2.0
@@ -99,7 +99,7 @@ def test_a_rod_that_pushes_does_not_clamp_whichever_way_the_face_lies(tmp_path: 
     stiffer = []
     for box in ("40, 50, 10, 10", "60, 60, 0, 10"):
         free = lever(tmp_path, box, 'across = "free"')
-        plate, chain = MechanismPlate(free, width_effect=False), MechanismChain(free)
+        plate, chain = MechanismPlate(free, width_effect=False), RigidBodies(free)
         arms = {"40, 50, 10, 10": 45.0, "60, 60, 0, 10": 60.0}[box]
         inertia = PLATE_MM / 12.0
         # Deflection at the arm by the moment P (arm - x) along the leaf from 10 to 20 mm.
@@ -128,7 +128,7 @@ def test_what_a_drive_cannot_do_is_refused(tmp_path: Path) -> None:
 
 SOFT_N_MM = 0.5
 ROD = 'across = "free"'
-KINDS = (MechanismPlate, MechanismFrame, MechanismChain)
+KINDS = (MechanismPlate, MechanismFrame, RigidBodies)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import Physics
 from fingervision.models.corotational_frame import CorotationalBody, turned_axes
@@ -16,7 +15,7 @@ from fingervision.models.finite_element import FiniteElementGripper, MechanismPl
 from fingervision.models.gripper_mechanism import half_mechanism, redrawn, whole_mechanism
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import MechanismFrame
-from fingervision.models.mechanism_chain import MechanismChain
+from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.models_sway_table import stiffnesses
 
@@ -75,16 +74,18 @@ def test_an_asymmetric_gripper_mirrors_with_its_drawing(gripper: Gripper) -> Non
     assert one.probes_mm["right tip"][0] < 0.98 * -one.probes_mm["left tip"][0]
 
 
-def test_the_chain_is_the_paper_s_matrix(gripper: Gripper) -> None:
+def test_rigid_bodies_are_the_paper_s_matrix(gripper: Gripper) -> None:
     alone = replace(half_mechanism(gripper), mirrored=False, probes={"tip": gripper.measuring_point_mm}, pairs={})
-    unit = MechanismChain(alone, theory=HingeTheory.BEAM).state(1.0)
+    unit = RigidBodies(alone, theory=HingeTheory.BEAM).state(1.0)
     assert 2.0 * unit.force_n == pytest.approx(2.27, abs=0.005)
     assert 2.0 * unit.probes_mm["tip"][0] == pytest.approx(7.792, abs=0.001)
 
 
-def test_a_loop_is_no_chain(gripper: Gripper) -> None:
-    with pytest.raises(ModelError, match="form a loop"):
-        MechanismChain(whole_mechanism(gripper, gripper, "both"))
+def test_both_halves_of_rigid_bodies_which_form_a_loop_are_twice_one_half(gripper: Gripper) -> None:
+    whole, half = (RigidBodies(m) for m in (whole_mechanism(gripper, gripper, "both"), half_mechanism(gripper)))
+    assert whole.stiffness_n_mm == pytest.approx(half.stiffness_n_mm, rel=1e-9)
+    assert whole.state(1.0).pairs_mm["gap"] == pytest.approx(half.state(1.0).pairs_mm["gap"], rel=1e-9)
+    assert whole.state(1.0).stress_mpa == pytest.approx(half.state(1.0).stress_mpa, rel=1e-9)
 
 
 def stiff_triangle() -> CorotationalBody:

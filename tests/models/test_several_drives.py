@@ -16,15 +16,15 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Drive, Mechanism
-from fingervision.models.mechanism_chain import MechanismChain
 from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
+from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.mechanism_toml import mechanism_from_tables, read_mechanism
 
 ROOT = Path(__file__).parents[2]
 STAGE = (ROOT / "fingervision" / "models" / "mechanisms" / "parallel_leaf_stage.toml").read_text()
 ARMS_PATH = ROOT / "fingervision" / "models" / "mechanisms" / "two_driven_arms.toml"
 ARMS = ARMS_PATH.read_text()
-KINDS = (MechanismPlate, MechanismFrame, MechanismChain)
+KINDS = (MechanismPlate, MechanismFrame, RigidBodies)
 ROUNDING = 1e-7
 
 
@@ -44,7 +44,7 @@ def both_ends_driven(base: float, stage: float) -> Mechanism:
     return replace(single, fixed=(), drives=(ground, replace(single.drives[0], per_input=stage)))
 
 
-@pytest.mark.parametrize("kind", [pytest.param(MechanismPlate, marks=pytest.mark.slow), MechanismFrame, MechanismChain])
+@pytest.mark.parametrize("kind", [pytest.param(MechanismPlate, marks=pytest.mark.slow), MechanismFrame, RigidBodies])
 def test_two_drives_are_the_sum_of_each_alone(kind: type[MechanismModel]) -> None:
     arms = drawn(ARMS)
     lower, upper = (kind(moving(arms, *alone)).state(1.0) for alone in ((1.0, 0.0), (0.0, 1.0)))
@@ -190,7 +190,7 @@ def test_the_chain_takes_one_drive_a_body() -> None:
         "[[probe]]", second + "[[probe]]", 1
     )
     with pytest.raises(FingervisionError, match="drives one body at several faces; take --kind lumped"):
-        MechanismChain(drawn(ears))
+        RigidBodies(drawn(ears))
 
 
 def test_the_packaged_drawing_is_read() -> None:
