@@ -109,6 +109,34 @@ def test_a_model_of_reversed_sign_is_said_and_nothing_is_named(tmp_path: Path) -
     assert "is mirrored" in (report.unknown or "")
 
 
+def rubbed(input_mm: np.ndarray, reach_mm: float) -> np.ndarray:
+    """Deflection of a band that rubs on the stage, and slips beyond `reach_mm`."""
+    out, at = np.empty_like(input_mm), 0.0
+    for k, step in enumerate(np.diff(input_mm, prepend=input_mm[0])):
+        at = float(np.clip(at + step, -reach_mm, reach_mm))
+        out[k] = at
+    return out
+
+
+@pytest.mark.slow
+def test_a_loop_larger_than_its_spring_is_no_exchange_of_directions(tmp_path: Path) -> None:
+    # Force against displacement of a friction damper, which grips harder to one side; the model is its best spring.
+    rng = np.random.default_rng(7)
+    time_s = 0.02 * np.arange(400)
+    u = 0.5 * np.sin(2.0 * np.pi * time_s) * np.minimum(1.0, time_s / 0.5)
+    force = u + 12.0 * rubbed(u, 0.1) * (1.0 + 0.6 * np.sign(rubbed(u, 0.3)) * u) + 0.01 * rng.standard_normal(u.size)
+    report = asked(tmp_path, {"time_s": time_s, "input_mm": u, "gap_mm": GAP_MM + force}, np.polyfit(u, force, 1)[0])
+    assert report.verdict is Verdict.UNKNOWN
+    assert "swapped" not in str(report.unknown)
+
+
+def test_exchanged_directions_are_asked_about(tmp_path: Path) -> None:
+    report = asked(tmp_path, stage("+-", 4, play_mm=-PLAY_MM))
+    assert report.verdict is Verdict.UNKNOWN
+    assert "swapped" in str(report.unknown)
+    assert not report.effects
+
+
 @pytest.mark.parametrize("scale", [1e3, 1.0 / 25.4])
 def test_a_model_in_another_unit_is_said_and_nothing_is_named(tmp_path: Path, scale: float) -> None:
     report = asked(tmp_path, stage("+-", 2, play_mm=0.0), scale=scale)

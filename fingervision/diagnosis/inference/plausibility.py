@@ -272,17 +272,19 @@ def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Ex
         own = _without(column, whitened, offsets, metric)
         norm = offsets.squared(own, metric)
         if norm > LEAST_NORM * max(float(column @ column), 1e-300):
-            moved = offsets.beside(own, metric)
-            coefficient = float(moved @ residual) / norm
-            if best is None or coefficient**2 * norm > best[0]:
-                best = coefficient**2 * norm, coefficient * width
+            # A swapped play leads by its whole width at most: the loop of a friction damper is larger.
+            taken = float(offsets.beside(own, metric) @ residual)
+            coefficient = float(np.clip(taken / norm, -1.0, 0.0))
+            gain = coefficient * (2.0 * taken - coefficient * norm)
+            if best is None or gain > best[0]:
+                best = gain, coefficient * width
     if best is None:
         return None
     gain, size_mm = best
     stands = offsets.squared(alone, metric)
     # Four numbers are fitted: offset and ratio, size and width of the play.
     cost = stands - gain + 4.0 * float(np.log(residual.size)) + 2.0 * float(np.log(len(problem.effects)))
-    if size_mm > 0.0 or gain < HALF * stands or cost > _physical(problem, rivals) - STRONG:
+    if gain < HALF * stands or cost > _physical(problem, rivals) - STRONG:
         return None
     return Finding(
         f"at reversals the gap leads the input by {1e3 * abs(size_mm):.3g} um instead of lagging behind it, which no "
