@@ -7,7 +7,7 @@ remains of each frequency is therefore unknown, as the optics are.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,8 @@ STRUCTURE_PX = 1.5
 # Numbers of unknowns of each edge: position, both plateaus as levels, slopes of both, ln of its own sigma over the
 # common one.
 OWN = 6
+# Logarithm of the odds against pixels that were smoothed.
+SMOOTHED_ODDS = float(np.log(150.0))
 # Side of a codec's block (pixels), number of places of an edge in it, and smallest standard deviation of a lost share.
 BLOCK_PX, PLACES, LEAST_LOST = 8, 32, 1e-3
 ROOT_2PI = float(np.sqrt(2.0 * np.pi))
@@ -73,6 +75,8 @@ class EdgeFit:
         Parameters of the scene.
     at_px, at_covariance : ndarray of float, shapes (edges,) and (edges, edges)
         Positions of the edges, and their covariance with everything else free.
+    by_pixels : bool
+        See `EdgeData`.
     """
 
     family: Family
@@ -88,6 +92,7 @@ class EdgeFit:
     beside: Floats = field(default_factory=lambda: np.zeros(0))
     at_px: Floats = field(default_factory=lambda: np.zeros(0))
     at_covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    by_pixels: bool = False
 
     def response(self) -> CameraResponse:
         """Tone curve of the fit."""
@@ -133,8 +138,12 @@ class EdgeData:
         Matrices that take the levels to their part of each frequency of a codec's transform.
     u_lost : ndarray of float, shape (frequencies,)
         Prior standard deviations of the shares that the codec has lost.
+    log_scale : float
+        Logarithm of the determinant of `whiten`, which is part of the evidence where uncertainties differ.
     are_alike : bool
         Whether both edges of a finger have nearly the same blur, because they lie in one depth.
+    by_pixels : bool
+        Whether pixels were smoothed, rather than the light on them.
     """
 
     away: Floats
@@ -147,7 +156,9 @@ class EdgeData:
     sigma: float
     bands: Floats
     u_lost: Floats
+    log_scale: float
     are_alike: bool
+    by_pixels: bool = False
 
     @classmethod
     def of(
@@ -187,7 +198,7 @@ class EdgeData:
         sizes = [each.shape[1] for each in seen]
         away, level, u, structure = np.zeros((4, len(profiles), max(sizes)))
         u += np.inf
-        whiten = np.zeros((*away.shape, max(sizes)))
+        whiten, log_scale = np.zeros((*away.shape, max(sizes))), 0.0
         for e, (profile, bins, n) in enumerate(zip(profiles, seen, sizes, strict=True)):
             away[e, :n], level[e, :n], u[e, :n], structure[e, :n] = bins
             away[e, n:] = away[e, n - 1]
@@ -198,6 +209,7 @@ class EdgeData:
             own = scale * structure[e, :n]
             covariance += own[:, None] * own * np.exp(-0.5 * (apart / STRUCTURE_PX) ** 2)
             whiten[e, :n, :n] = np.linalg.inv(np.linalg.cholesky(covariance))
+            log_scale += float(np.sum(np.log(np.diag(whiten[e, :n, :n]))))
         contrast = float(np.median([profile.contrast for profile in profiles]))
         return cls(
             away,
@@ -210,6 +222,7 @@ class EdgeData:
             sigma,
             _bands(away, sizes) if len(steps) else np.zeros((0, *whiten.shape)),
             _u_lost(sigma, contrast, np.array(steps)),
+            log_scale,
             discrepancy > 0.0 or bool(structure.any()),
         )
 
@@ -347,7 +360,8 @@ def fitted(
     hessian = jacobian.T @ jacobian + precision
     size = np.sqrt(np.diag(hessian))
     covariance = np.linalg.inv(hessian / np.outer(size, size)) / np.outer(size, size)
-    evidence = -cost - 0.5 * float(np.linalg.slogdet(hessian)[1]) - float(np.sum(np.log((*family.u, *scene.u))))
+    evidence = data.log_scale - cost - 0.5 * float(np.linalg.slogdet(hessian)[1])
+    evidence -= float(np.sum(np.log((*family.u, *scene.u))))
     count = np.isfinite(data.u).sum(axis=1)
     chi = np.sum(residual.reshape(edges, -1) ** 2, axis=1)
     optics = np.s_[k + beside : k + beside + OPTICS]
@@ -368,7 +382,26 @@ def fitted(
         unknowns[k : k + beside],
         unknowns[at],
         covariance[np.ix_(at, at)],
+        data.by_pixels,
     )
+
+
+def with_smoothing(data: EdgeData, families: Sequence[Family]) -> EdgeData:
+    """The same bins, and whether pixels were smoothed, which sharp edges tell.
+
+    Parameters
+    ----------
+    data : EdgeData
+        The profiles.
+    families : sequence of Family
+        Families of tone curves, one of which may be that of the camera.
+    """
+    smoothed = replace(data, by_pixels=True)
+    by_light = max((fitted(each, data, data.start()) for each in families), key=lambda fit: fit.log_evidence)
+    if float(np.mean(by_light.misfit)) < 1.0:
+        return data
+    by_pixels = max(fitted(each, smoothed, smoothed.start()).log_evidence for each in families)
+    return smoothed if by_pixels - by_light.log_evidence > SMOOTHED_ODDS else data
 
 
 def prior_mean(family: Family, scene: Scene, data: EdgeData) -> Floats:
@@ -433,7 +466,7 @@ class _Seen:
         x = data.away - own[:, :1]
         place = (x[..., None] - distances[:, None]) * narrower[:, None, None]
         side = data.side[:, None, None]
-        blurred = BlurredStep.of(optics)
+        blurred = BlurredStep.of(optics, data.by_pixels)
         value, slope = blurred.at(side * place)
         # An edge that faces the other way sees the tails of the optics swapped.
         step = 0.5 + side * (value - 0.5)

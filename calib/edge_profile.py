@@ -72,6 +72,7 @@ def binned_profile(
     *,
     is_outer: bool = False,
     part: NDArray[np.intp] | None = None,
+    shared_rows: float = 1.0,
 ) -> EdgeProfile | None:
     """Mean profile of the pixels across one edge; None if there are too few.
 
@@ -92,6 +93,8 @@ def binned_profile(
     part : ndarray of int, shape (n,), or None
         Number of the part along the edge, the same in all pictures: what lies on the edge does not average out over
         them.
+    shared_rows : float
+        Number of neighbouring rows that share one error, as far as a single picture tells.
     """
     place = np.floor(away_px / BIN_PX).astype(int)
     place -= place.min()
@@ -109,7 +112,7 @@ def binned_profile(
     of_group = np.zeros((int(group.max()) + 1, count.size))
     np.add.at(of_group, (group, place), left)
     shared = np.sum(of_group**2, axis=0) / n**2
-    u_mean = np.sqrt(np.maximum(_smooth(shared), variance / n))
+    u_mean = np.sqrt(np.maximum(_smooth(shared), variance * shared_rows / n))
     full = count >= FEWEST_IN_BIN
     if np.count_nonzero(full) < FEWEST_BINS:
         return None

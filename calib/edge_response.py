@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera_response import CameraResponse
-from calib.edge_fit import EdgeData, EdgeFit, fitted
+from calib.edge_fit import EdgeData, EdgeFit, fitted, with_smoothing
 from calib.edge_profile import EdgeProfile
 from calib.tone_curves import FAMILIES, LEVELS, curve_response, family
 
@@ -52,6 +52,7 @@ def fit_families(
         Steps of a codec's quantiser for the eight frequencies across an edge (shares of full scale); empty without one.
     """
     data = EdgeData.of(profiles, model_error, scale, steps)
+    data = with_smoothing(data, [each for each in FAMILIES if not each.mean])
     families = list(FAMILIES)
     if tagged and all(each.name != tagged for each in FAMILIES):
         families.append(family(tagged))

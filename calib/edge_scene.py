@@ -18,9 +18,10 @@ Bools = NDArray[np.bool_]
 
 # Share of a shadow's depth on a flank, as a logit, if light comes from the front.
 ALL_SIDES = 3.0
-# Number of equal steps into which a shadow's light is divided.
-SHADOW_STEPS = 10
-_QUANTILES = (np.arange(SHADOW_STEPS) + 0.5) / SHADOW_STEPS
+# Places of the equal steps into which light that changes evenly is divided, in units of its extent; places and shares
+# of the steps of light that comes back exponentially. Steps farther apart than twice the blur would be seen.
+EVEN: Floats = np.asarray((np.arange(10) + 0.5) / 10)
+EXPONENTIAL: Floats = np.asarray(0.3 * (np.arange(16) + 0.5))
 
 # Distances outwards and weights of all steps, shapes (sets, edges, steps), from parameters (sets, k), the direction of
 # each edge (+1: the ground has the larger coordinates), and whether it is an outer one.
@@ -34,7 +35,7 @@ class Scene:
     Parameters
     ----------
     name : str
-        Name, as in `GapMeasurement.beside`; empty for nothing.
+        Name, as in `GapMeasurement.beside`; empty for what displaces no edge.
     steps : callable
         See `Steps`.
     mean, u : tuple of float
@@ -46,6 +47,8 @@ class Scene:
     u_form : float
         Relative standard uncertainty of a displacement, because real walls, shadows and lines are not even along a
         finger, and lines of other shapes fit as well.
+    is_on_tip : bool
+        Whether it is seen all around a finger, also beside its tip.
     """
 
     name: str
@@ -55,6 +58,7 @@ class Scene:
     starts: tuple[tuple[tuple[float, ...], float, float], ...]
     probability: float
     u_form: float = 0.0
+    is_on_tip: bool = False
 
     @property
     def has_wall(self) -> bool:
@@ -97,11 +101,46 @@ def _band(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
     return np.stack([-breadth, np.zeros_like(breadth)], -1), np.stack([light, 1.0 - light], -1)
 
 
-def _shadow(places: Floats, *, is_apart: bool = False) -> Steps:
-    """Shadow on the ground: its light comes back at these places; sides may have unlike shares.
+def _mark(faces: Callable[[Floats, Bools], Floats]) -> Steps:
+    """Another tone on the finger along the flanks for which `faces` is not zero: its breadth, the change of its light.
+
+    A pad or tape lies on the inner sides; shading changes with the direction in which a flank faces.
+    """
+
+    def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+        breadth = np.broadcast_to(np.exp(p[:, :1]), (len(p), side.size))
+        light = p[:, 1:2] * faces(side, is_outer)
+        return np.stack([-breadth, np.zeros_like(breadth)], -1), np.stack([light, 1.0 - light], -1)
+
+    return steps
+
+
+def _motion(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+    """Way of each finger while the shutter was open: it spreads the light of both flanks evenly, and moves neither."""
+    way = np.exp(np.where((side > 0.0) == ~is_outer, p[:, :1], p[:, 1:2]))
+    return way[..., None] * (EVEN - 0.5), np.full((*way.shape, EVEN.size), 1.0 / EVEN.size)
+
+
+def _trail(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+    """Earlier pictures that a camera mixes in: mean length behind each finger, positive towards larger coordinates."""
+    length = side * np.where((side > 0.0) == ~is_outer, p[:, :1], p[:, 1:2])
+    shares = np.exp(-EXPONENTIAL)
+    return length[..., None] * EXPONENTIAL, np.broadcast_to(shares / shares.sum(), (*length.shape, shares.size))
+
+
+def _spread(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+    """Light spread evenly to both sides all around, by the optics or by what a camera does to its pictures."""
+    width = np.broadcast_to(np.exp(p[:, :1]), (len(p), side.size))
+    return width[..., None] * (EVEN - 0.5), np.full((*width.shape, EVEN.size), 1.0 / EVEN.size)
+
+
+def _shadow(places: Floats, shares: Floats | None = None, *, is_apart: bool = False) -> Steps:
+    """Shadow on the ground: its light comes back at these places, equally if not by shares; sides may be unlike.
 
     It begins at the edge or, of a part high above the ground, some way apart from it.
     """
+    parts = np.ones(places.size) if shares is None else shares
+    parts = parts / parts.sum()
 
     def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
         length = np.broadcast_to(np.exp(p[:, 1:2]), (len(p), side.size))
@@ -110,8 +149,7 @@ def _shadow(places: Floats, *, is_apart: bool = False) -> Steps:
         depth = _logistic(p[:, :1]) * share
         rest_at = length[..., None] * places + (np.exp(p[:, 3:4, None]) if is_apart else 0.0)
         at = np.concatenate([np.zeros((*length.shape, 1)), rest_at], -1)
-        rest = np.repeat(depth[..., None] / SHADOW_STEPS, SHADOW_STEPS, -1)
-        return at, np.concatenate([1.0 - depth[..., None], rest], -1)
+        return at, np.concatenate([1.0 - depth[..., None], depth[..., None] * parts], -1)
 
     return steps
 
@@ -126,9 +164,9 @@ def _log(*widths: float) -> tuple[float, ...]:
 
 # Prior means and standard deviations, and starts of the fits. Widths are those of parts of 0.1 to 2 mm at 10 to
 # 60 px/mm.
-_WALL = ((*_log(3.0, 3.0), 0.0), (0.8, 0.8, 1.2))
+_WALL = ((*_log(3.0, 3.0), 0.0), (0.8, 0.8, 0.9))
 _INNER_WALL = (*_WALL, tuple(((*_log(width, width), 0.0), -0.5 * width, 0.0) for width in (1.2, 3.0, 7.0)))
-_SIDE_WALL = (*_WALL, tuple(((*_log(width, width), 0.0), -0.25 * width, -0.25 * width) for width in (1.5, 4.0)))
+_SIDE_WALL = (*_WALL, tuple(((*_log(width, width), 0.0), -0.25 * width, -0.25 * width) for width in (1.5, 4.0, 8.0)))
 _LINE = (
     (*_log(2.0, 2.0, 0.5), 0.0),
     (0.7, 0.7, 0.8, 0.5),
@@ -148,18 +186,29 @@ _SHADOW_APART = (
     tuple(((*start, *_log(2.0)), -0.3, -0.3) for start in _SHADOW_STARTS[::2]),
 )
 
-NOTHING = Scene("", _nothing, (), (), (((), 0.0, 0.0),), 0.72)
+_MARK = ((*_log(5.0), 0.0), (0.7, 0.06), tuple(((*_log(width), 0.05), 0.0, 0.0) for width in (3.0, 8.0)))
+_SPREAD = (_log(2.0), (0.7,), ((_log(2.0), 0.0, 0.0), (_log(5.0), 0.0, 0.0)))
+_TRAIL = ((0.0, 0.0), (2.0, 2.0), tuple(((x, y), 0.0, 0.0) for x in (-1.5, 1.5) for y in (-1.5, 1.5)))
+_MOTION = (_log(4.0, 4.0), (1.0, 1.0), tuple((_log(way, way), 0.0, 0.0) for way in (3.0, 8.0)))
+
+NOTHING = Scene("", _nothing, (), (), (((), 0.0, 0.0),), 0.48)
 # Prior probabilities: one recording in ten shows a wall (thick parts), a shadow, or a bright line (edges that are
 # chamfered or polished); a chamfer that is evenly bright up to the edge on all sides is rare.
 SCENES = (
     Scene("wall", _wall(lambda side, is_outer: np.where(is_outer, 0.0, 1.0)), *_INNER_WALL, 0.06, 0.1),
     Scene("wall", _wall(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02, 0.1),
     Scene("wall", _wall(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02, 0.1),
-    Scene("glare", _line, *_LINE, 0.06, 0.35),
-    Scene("glare", _band, *_BAND, 0.02, 0.35),
-    Scene("shadow", _shadow(_QUANTILES), *_SHADOW, 0.045, 0.1),
-    Scene("shadow", _shadow(-np.log1p(-_QUANTILES)), *_SHADOW, 0.045, 0.1),
-    Scene("shadow", _shadow(_QUANTILES, is_apart=True), *_SHADOW_APART, 0.01, 0.1),
+    Scene("glare", _line, *_LINE, 0.06, 0.35, True),
+    Scene("glare", _band, *_BAND, 0.02, 0.35, True),
+    Scene("shadow", _shadow(EVEN), *_SHADOW, 0.045, 0.1, True),
+    Scene("shadow", _shadow(EXPONENTIAL, np.asarray(np.exp(-EXPONENTIAL))), *_SHADOW, 0.045, 0.1, True),
+    Scene("shadow", _shadow(EVEN, is_apart=True), *_SHADOW_APART, 0.01, 0.1, True),
+    Scene("", _mark(lambda side, is_outer: np.where(is_outer, 0.0, 1.0)), *_MARK, 0.03),
+    Scene("", _mark(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_MARK, 0.02),
+    Scene("", _mark(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_MARK, 0.02),
+    Scene("", _motion, *_MOTION, 0.05),
+    Scene("", _trail, *_TRAIL, 0.03),
+    Scene("", _spread, *_SPREAD, 0.1, is_on_tip=True),
 )
 
 
@@ -183,7 +232,8 @@ def pair(first: Scene, second: Scene) -> Scene:
         for own, inner, outer in first.starts
         for other, other_inner, other_outer in second.starts
     )
-    return Scene(name, steps, first.mean + second.mean, first.u + second.u, starts, chance, u_form)
+    is_on_tip = first.is_on_tip or second.is_on_tip
+    return Scene(name, steps, first.mean + second.mean, first.u + second.u, starts, chance, u_form, is_on_tip)
 
 
 # Pairs that are tried where one alone does not explain the edges.

@@ -1,12 +1,23 @@
 """Evidence for what stands beside the edges: each scene fitted with each family of tone curves."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from calib.edge_fit import START_WIDENED, EdgeData, EdgeFit, derivatives, edge_width, fitted, priors
+from calib.edge_fit import (
+    SMOOTHED_ODDS,
+    START_WIDENED,
+    EdgeData,
+    EdgeFit,
+    derivatives,
+    edge_width,
+    fitted,
+    priors,
+    with_smoothing,
+)
 from calib.edge_profile import EdgeProfile
 from calib.edge_scene import NOTHING, PAIRS, PROBE, SCENES, Scene
 from calib.tone_curves import Family
@@ -22,6 +33,9 @@ HOPELESS = 20.0
 WIDER_INSIDE = 0.02
 # Mean chi-square of a bin above which two things at once are tried.
 LEAVES_MORE = 1.1
+# Discrepancies of real edges from the models, in units of the usual one, that are tried while more is left: each is as
+# many times less probable as its square. Number of fits that are made again with them, plain edges apart.
+DISCREPANCIES, MOST_AGAIN = (2.0, 4.0, 8.0, 16.0), 4
 # Rate of false alarms of the score test, and least information of a direction as a share of the largest.
 FALSE_ALARMS, LEAST_TOLD = 1e-3, 1e-3
 
@@ -31,6 +45,9 @@ def fit_scenes(
     discrepancy: float,
     families: Sequence[Family],
     others: Sequence[Family] = (),
+    steps: Sequence[float] = (),
+    *,
+    scenes: Sequence[Scene] = SCENES,
 ) -> list[EdgeFit]:
     """Fit everything that may stand beside the edges, the most probable first.
 
@@ -44,21 +61,68 @@ def fit_scenes(
         Families of tone curves that are fitted with every scene.
     others : sequence of Family
         Families that are fitted with nothing beside the edges, and with scenes that the first family does not exclude.
+    steps : sequence of float
+        Steps of a codec's quantiser for the eight frequencies across an edge (shares of full scale); empty without one.
+    scenes : sequence of Scene
+        What may stand beside the edges; pairs are tried if all may.
     """
-    data = EdgeData.of(profiles, discrepancy=discrepancy, is_wide=True)
-    coarse = EdgeData.of(profiles, discrepancy=discrepancy, is_wide=True, every=COARSE)
+    data = EdgeData.of(profiles, steps=steps, discrepancy=discrepancy, is_wide=True)
+    coarse = EdgeData.of(profiles, steps=steps, discrepancy=discrepancy, is_wide=True, every=COARSE)
     narrowest = min(edge_width(profile) for profile in profiles)
+
     fits = [fitted(family, data, data.start()) for family in families]
-    for scene in SCENES:
+    for scene in scenes:
         fits += _fits(scene, families, data, coarse, narrowest)
-    if float(np.mean(max(fits, key=lambda fit: fit.log_evidence).misfit)) > LEAVES_MORE:
+    best = max(fits, key=lambda fit: fit.log_evidence)
+    smoothed = replace(data, by_pixels=True)
+    again = [_refitted(best, smoothed), *(fitted(family, smoothed, smoothed.start()) for family in families)]
+    if max(fit.log_evidence for fit in again) - best.log_evidence > SMOOTHED_ODDS:
+        data, coarse = smoothed, replace(coarse, by_pixels=True)
+        fits = [*again, *(_refitted(fit, smoothed) for fit in fits if fit is not best)]
+    best = max(fits, key=lambda fit: fit.log_evidence)
+    if scenes is SCENES and float(np.mean(best.misfit)) > LEAVES_MORE:
         for scene in PAIRS:
             fits += _fits(scene, families[:1], data, coarse, narrowest)
+    fits += _less_exact(fits, profiles, discrepancy, steps, by_pixels=data.by_pixels)
     least = max(fit.log_evidence for fit in fits) - HOPELESS
     begun = [fit for fit in fits if fit.family is families[0] and (fit.scene is NOTHING or fit.log_evidence > least)]
     for fit in begun:
         fits += [fitted(each, data, fit.edges, fit.scene, (np.array(each.mean), fit.beside)) for each in others]
     return sorted(fits, key=lambda fit: -fit.log_evidence)
+
+
+def _refitted(fit: EdgeFit, data: EdgeData) -> EdgeFit:
+    """The same fit to other data, which begins where it ended."""
+    return fitted(fit.family, data, fit.edges, fit.scene, (fit.parameters, fit.beside))
+
+
+def _less_exact(
+    fits: Sequence[EdgeFit],
+    profiles: Sequence[EdgeProfile],
+    discrepancy: float,
+    steps: Sequence[float],
+    *,
+    by_pixels: bool,
+) -> list[EdgeFit]:
+    """The most probable fits and plain edges again, if real edges differ more from the models than usual ones."""
+    found: list[EdgeFit] = []
+    best = sorted(fits, key=lambda fit: -fit.log_evidence)
+    plain = next(fit for fit in best if fit.scene is NOTHING)
+    tried = [*best[:MOST_AGAIN], *([] if plain in best[:MOST_AGAIN] else [plain])]
+    for times in DISCREPANCIES:
+        is_explained = float(np.mean(tried[0].misfit)) < LEAVES_MORE
+        tried = [fit for fit in tried if fit.scene is NOTHING or not is_explained]
+        if is_explained and all(float(np.mean(fit.misfit)) < LEAVES_MORE for fit in tried):
+            break
+        # A part of what is left is independent from bin to bin, as what the pixels of a sharp edge leave.
+        data = EdgeData.of(
+            profiles, 0.5 * times * discrepancy, steps=steps, discrepancy=times * discrepancy, is_wide=True
+        )
+        data = replace(data, by_pixels=by_pixels)
+        tried = [_refitted(fit, data) for fit in tried]
+        tried.sort(key=lambda fit: -fit.log_evidence)
+        found += [replace(fit, log_evidence=fit.log_evidence - 2.0 * float(np.log(times))) for fit in tried]
+    return found
 
 
 def _fits(
@@ -81,9 +145,11 @@ def _fits(
     return found
 
 
-def is_more_beside(profiles: Sequence[EdgeProfile], model_error: float, family: Family) -> bool:
+def is_more_beside(
+    profiles: Sequence[EdgeProfile], model_error: float, family: Family, steps: Sequence[float] = ()
+) -> bool:
     """Whether steps of light beside the edges would explain what the fit of a family leaves (score test)."""
-    data = EdgeData.of(profiles, model_error, is_wide=True)
+    data = with_smoothing(EdgeData.of(profiles, model_error, steps=steps, is_wide=True), [family])
     fit = fitted(family, data, data.start())
     wider = fit.edges[data.own_places()[:, -1]]
     if abs(float(wider[~data.is_outer].mean() - wider[data.is_outer].mean())) > WIDER_INSIDE:

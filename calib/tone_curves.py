@@ -86,7 +86,7 @@ def _power_series(p: Floats) -> Floats:
 def _shoulder(p: Floats) -> Floats:
     """A film's shoulder: light^n = h s / (1 + s - h), with h a power of the level."""
     h, s = LEVELS ** np.exp(p[0]), np.exp(p[1])
-    return np.asarray((h * s / (1.0 + s - h)) ** np.exp(-p[2]))
+    return np.asarray((h * s / np.maximum(1.0 + s - h, 1e-9)) ** np.exp(-p[2]))
 
 
 # Exponents of consumer cameras lie around 2 (Grossberg & Nayar 2004, doi:10.1109/TPAMI.2004.88), log profiles span five

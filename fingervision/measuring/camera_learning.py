@@ -8,17 +8,16 @@ from calib.calibration import is_stated
 from calib.measured_scale import Calibration
 from fingervision.domain.camera import CameraModel, Origin
 from fingervision.domain.frame import Coding, Frame, LostFrame
-from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.one_thread import one_thread
 from fingervision.domain.own_process import in_own_process
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.temporal_filter import temporal_lag
-from fingervision.vision.defect_pixels import blanked, defect_pixels
-from fingervision.vision.flank_profiles import Seen
+from fingervision.vision.defect_pixels import defect_pixels
 from fingervision.vision.grey import to_grey, top_level
-from fingervision.vision.learnt_camera import MODEL_ERROR, learnt_camera
+from fingervision.vision.learnt_camera import learnt_camera
 from fingervision.vision.learnt_scene import learnt_beside, less_sure
-from fingervision.vision.pipeline import Settings, look_closely, region_of_interest
+from fingervision.vision.pipeline import Settings, steps_alone
+from fingervision.vision.single_picture import beside_in
 
 # Number of frames with a gap from which the camera is learnt: five show all sub-pixel positions of slightly tilted
 # flanks, twelve average their noise. Fewest frames; most frames that are read for them, and pixels that are kept.
@@ -94,35 +93,30 @@ def camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) 
 def _camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None) -> CameraModel:
     settings = replace(settings, camera=_with_defects(settings.camera, frames, settings.bits))
     before = settings.camera
-    looks = [(frame, look) for frame in frames if (look := _steps_alone(frame, settings)) is not None]
-    if len(looks) < FEWEST:
+    looks = [(frame, look) for frame in frames if (look := steps_alone(frame, settings)) is not None]
+    if not looks:
         return before
     seen = [each for _, (each, _) in looks]
-    first, are_dark = looks[0][0], all(is_dark for _, (_, is_dark) in looks)
+    first, polarities = looks[0][0], {is_dark for _, (_, is_dark) in looks}
+    are_dark = polarities == {True}
     coding, top = first.coding, max(top_level(to_grey(frame.pixels), settings.bits) for frame, _ in looks)
+    if len(looks) < FEWEST:  # too few phases and too much noise for a tone curve
+        return replace(before, beside=beside_in(frames, settings))
     camera = learnt_camera(seen, before, top, coding, are_dark=are_dark)
     if coding is not Coding.INTERFRAME:  # such a codec repeats the noise of the picture before
         lag = temporal_lag([(frame.index, *each) for frame, (each, _) in looks])
         camera = replace(camera, lag=lag)
     if _has_edge_bias(scale):
         camera = replace(camera, response=before.response, beside=None)
-    if are_dark and (before.response.is_known or camera.response.curve is not before.response.curve):
+    is_other = before.response.is_known or camera.response.curve is not before.response.curve
+    if polarities == {False} or (are_dark and is_other):
         # The steps of light lie elsewhere under another response.
         again = replace(settings, camera=camera)
-        seen = [look[0] for frame, _ in looks if (look := _steps_alone(frame, again)) is not None]
-        beside = learnt_beside(seen, camera.response.curve, top, coding, MODEL_ERROR[coding])
+        seen = [look[0] for frame, _ in looks if (look := steps_alone(frame, again)) is not None]
+        beside = learnt_beside(seen, camera.response, top, coding, are_dark=are_dark)
         rivals_px = camera.beside.u_gap_px if camera.beside is not None and not camera.beside.name else 0.0
         camera = replace(camera, beside=less_sure(beside, rivals_px))
     return camera
-
-
-def _steps_alone(frame: Frame, settings: Settings) -> tuple[Seen, bool] | None:
-    """Picture and fitted steps of a frame with a gap, and whether its fingers are darker than the ground."""
-    outcome, fingers, edges = look_closely(frame, settings, only_steps=True)
-    if not isinstance(outcome, GapMeasurement) or fingers is None or edges is None:
-        return None
-    grey = region_of_interest(blanked(to_grey(frame.pixels), settings.camera.defects), settings.region)
-    return (fingers.orientation.view(grey), edges), outcome.light_gap
 
 
 def _with_defects(camera: CameraModel, frames: Sequence[Frame], bits: int | None) -> CameraModel:

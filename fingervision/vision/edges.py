@@ -80,6 +80,8 @@ class EdgePoints:
         Level of each finger next to its inner flank.
     shared_lines : float
         Number of neighbouring lines that share their noise.
+    shared_on_both : float
+        The smaller number of the fingers and the ground.
     noise_flat : float
         Standard deviation of the light in the flat parts beside the edges; 0 if no flat part is in view.
     beside : str
@@ -99,6 +101,7 @@ class EdgePoints:
     marks: tuple[EdgeMark, EdgeMark]
     inside: tuple[float, float]
     shared_lines: float = 1.0
+    shared_on_both: float = 1.0
     noise_flat: float = 0.0
     beside: str = ""
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from calib.edge_profile import EdgeProfile, binned_profile
@@ -15,8 +16,9 @@ Floats = NDArray[np.float64]
 # Extent of a profile to either side: this multiple of the blur plus these pixels, at most the last number of pixels,
 # and at most half of the distance to the next edge.
 REACH_SIGMAS, REACH_EXTRA_PX, FARTHEST_PX = 4.0, 4.0, 20
-# Largest scatter of the rows about a straight line (pixels), and fewest fitted rows, in the part far from the tip.
-STRAIGHT_PX, FEWEST_ROWS = 0.4, 6
+# Degrees of the curve along a flank, in the part far from the tip: a long fillet bends it. Scatter of the rows beyond
+# their noise up to which the lower degree is enough, largest scatter about the curve (pixels), and fewest fitted rows.
+DEGREES, STRAIGHT_PX, MOST_SCATTER_PX, FEWEST_ROWS = (1, 4), 0.03, 0.4, 6
 # Least contrast of a flank (share of full scale) within which a curve can be seen, and levels beyond which it is
 # clipped.
 LEAST_CONTRAST, CLIPPED = 0.08, (0.5 / 255.0, 0.99)
@@ -73,7 +75,14 @@ def flank_profile(
     rows = np.concatenate([row for *_, row in gathered])
     outward = float(seen[0][1].lines.outward[finger, part][0])
     return binned_profile(
-        away, level, frame, 1.0 / top_level, outward, is_outer=not is_inner, part=(rows - rows.min()) // PART_PX
+        away,
+        level,
+        frame,
+        1.0 / top_level,
+        outward,
+        is_outer=not is_inner,
+        part=(rows - rows.min()) // PART_PX,
+        shared_rows=float(np.median([edges.shared_lines for _, edges in seen])),
     )
 
 
@@ -86,10 +95,15 @@ def _one(
     if rows.size < FEWEST_ROWS:
         return None
     fixed, found = edges.lines.fixed[finger, part][rows].astype(float), edges.position[finger, part][rows]
-    slope, at = np.polyfit(fixed, found, 1)
-    off = np.abs(found - at - slope * fixed)
-    spread = 1.4826 * float(np.median(off))
-    if spread > STRAIGHT_PX:
+    noise = float(np.median(edges.u_position[finger, part][rows]))
+    for degree in DEGREES:
+        if rows.size < FEWEST_ROWS + degree - 1:
+            return None
+        off = np.abs(found - Polynomial.fit(fixed, found, degree)(fixed))
+        spread = 1.4826 * float(np.median(off))
+        if spread < 2.0 * noise + STRAIGHT_PX:
+            break
+    if spread > MOST_SCATTER_PX:
         return None
     keep = off < 3.0 * max(spread, 0.02)
     if np.count_nonzero(keep) < FEWEST_ROWS:
@@ -100,9 +114,9 @@ def _one(
     is_clean = np.interp(every, fixed[order], keep[order].astype(float)) == 1.0
     if np.count_nonzero(is_clean) < FEWEST_ROWS:
         is_clean[:] = True
-    slope, at = np.polyfit(fixed[keep], found[keep], 1)
+    curve = Polynomial.fit(fixed[keep], found[keep], degree)
+    line = curve(every)
     outward = int(edges.lines.outward[finger, part][0])
-    line = at + slope * every
     room = _room_px(upright, edges, line)
     sigma = float(edges.blur_px[finger, 0])
     reach = int(min(REACH_SIGMAS * sigma + extra_px, FARTHEST_PX, room))
@@ -112,7 +126,7 @@ def _one(
     inside = (columns >= 0) & (columns < upright.shape[1]) & is_clean[:, None]
     levels = upright[np.broadcast_to(every[:, None], columns.shape)[inside], columns[inside]].astype(np.float64)
     is_known = np.isfinite(levels)
-    cosine = float(1.0 / np.hypot(1.0, slope))
+    cosine = (1.0 / np.hypot(1.0, curve.deriv()(every)))[:, None]
     away, row = (
         outward * (columns - line[:, None]) * cosine,
         np.broadcast_to((every - every[0])[:, None], columns.shape),

@@ -9,8 +9,6 @@ from calib.camera_response import CURVES, standard_response
 from calib.edge_fit import EdgeFit
 from calib.edge_profile import EdgeProfile
 from calib.edge_response import LINEAR_PRIOR, ResponsePosterior, fit_families, probabilities
-from calib.edge_scene import NOTHING
-from calib.scene_fit import fit_scenes, is_more_beside
 from calib.tone_curves import family
 from fingervision.domain.camera import (
     CameraModel,
@@ -23,26 +21,20 @@ from fingervision.domain.camera import (
 from fingervision.domain.frame import Coding
 from fingervision.vision.flank_profiles import Seen, unclipped_profiles
 from fingervision.vision.learnt_scene import (
-    BESIDE_PX,
-    DISCREPANCY,
+    MODEL_ERROR,
+    MOST_OVERSHOOT,
+    STEPS,
     SURE,
+    FlankSight,
     beside_edges,
-    can_tell_beside,
     less_sure,
+    overshoot,
     u_of_rivals_px,
     with_structure,
 )
 
-# Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
-MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.01}
-# Steps of the quantiser for the eight frequencies across an edge, as shares of full scale: the luminance table of JPEG
-# (ITU-T T.81, annex K.1, first row) at quality 75, the default of most programs, which halves it.
-STEPS = {Coding.INTRAFRAME: tuple(0.5 * step / 255.0 for step in (16, 11, 10, 16, 24, 40, 51, 61))}
 # Ratio of the residuals to their uncertainty above which no family explains the edges.
 MOST_MISFIT = 1.3
-# Overshoot of an edge (share of its contrast) above which the camera sharpens: sharpening after the tone curve makes
-# the profile even in the levels, and so imitates another response at a perfect fit.
-MOST_OVERSHOOT = 0.03
 # Negative share of the point spread's tails from which the camera sharpens: no optics takes light away.
 NEGATIVE_TAILS = 0.08
 # Share of a curve's displacement of an edge that is added to the uncertainty for curves of no family: their error in
@@ -96,24 +88,26 @@ def learnt_camera(
     CameraModel
         The prior with a learnt response; or with the assumed one and a sentence on why it could not be learnt.
     """
-    wide = unclipped_profiles(seen, top_level, BESIDE_PX) if are_dark else []
-    return learnt_from_profiles(unclipped_profiles(seen, top_level), prior, coding, wide)
+    sight = FlankSight.of(seen, top_level, coding) if are_dark else None
+    return learnt_from_profiles(unclipped_profiles(seen, top_level), prior, coding, sight)
 
 
 def learnt_from_profiles(
-    profiles: list[EdgeProfile], prior: CameraModel, coding: Coding, wide: Sequence[EdgeProfile] = ()
+    profiles: list[EdgeProfile], prior: CameraModel, coding: Coding, sight: FlankSight | None = None
 ) -> CameraModel:
     """Camera as the mean profiles of unclipped flanks show it, also with more of the ground; see `learnt_camera`."""
     if not profiles:
         return _not_learnt(prior, NO_FLANKS, 1.0 / 3.0)
-    profiles, wide = with_structure(profiles, coding), with_structure(wide, coding)
-    overshoot = float(np.median([profile.overshoot for profile in profiles]))
-    prior = replace(prior, sharpening=CameraQuantity(overshoot, MODEL_ERROR[coding], Origin.LEARNT))
-    if overshoot > MOST_OVERSHOOT:
-        return _not_learnt(prior, SHARPENED.format(share=overshoot), 1.0)
+    profiles = with_structure(profiles, coding)
+    beyond = overshoot(profiles)
+    prior = replace(prior, sharpening=CameraQuantity(beyond, MODEL_ERROR[coding], Origin.LEARNT))
+    if beyond > MOST_OVERSHOOT:
+        return _not_learnt(prior, SHARPENED.format(share=beyond), 1.0)
     assumed = prior.response.curve
     fits, misfit = _fitted(profiles, coding, assumed.name if assumed.name in CURVES else "")
-    scenes, bare = _with_scenes(fits, wide, coding)
+    # With a stated response, what stands beside the edges is learnt by itself (`learnt_scene`).
+    is_known = prior.response.is_known
+    scenes, bare = ([], 1.0) if is_known or sight is None else _with_scenes(fits, sight)
     every = scenes
     if bare < UNLIKELY:
         fits, misfit = scenes, _misfit(scenes)
@@ -129,14 +123,16 @@ def learnt_from_profiles(
         point_spread=_point_spread(best),
         discrepancy=CameraQuantity(max(misfit, 1.0) * MODEL_ERROR[coding], None, Origin.LEARNT),
     )
-    if not prior.response.is_known:
+    if not is_known:
         camera = _with_response(camera, fits, scenes, coding)
-    if camera.response.curve is assumed and wide:
+    if not every or sight is None:
+        return camera
+    if camera.response.curve is assumed:
         same = [fit for fit in every if fit.family.name == assumed.name]
-        if any(fit.scene is not NOTHING for fit in same):
-            camera = replace(camera, beside=beside_edges(same, wide))
-    if every and not prior.response.is_known and coding is not Coding.INTERFRAME:
-        u_px = u_of_rivals_px(every, probabilities(every), wide, camera.response.curve.name)
+        if any(fit.scene.name for fit in same):
+            camera = replace(camera, beside=beside_edges(same, sight.profiles))
+    if coding is not Coding.INTERFRAME:
+        u_px = u_of_rivals_px(every, probabilities(every), sight.profiles, camera.response.curve.name)
         camera = replace(camera, beside=less_sure(camera.beside, u_px))
     return camera
 
@@ -151,9 +147,7 @@ def _with_response(
         return _not_learnt(camera, HIDDEN, 1.0 - LINEAR_PRIOR)
     response = _response(fits, coding)
     rivals = zip(scenes, probabilities(scenes), strict=True) if scenes else ()
-    others = [
-        OtherResponse(fit.response(), float(p)) for fit, p in rivals if p > LEAST_RIVAL and fit.scene is not NOTHING
-    ]
+    others = [OtherResponse(fit.response(), float(p)) for fit, p in rivals if p > LEAST_RIVAL and fit.scene.name]
     response = replace(response, others=(*response.others, *others))
     if response.curve.white != assumed.white:  # a video of studio range stays clipped at its white
         response = replace(response, curve=replace(response.curve, white=assumed.white))
@@ -179,17 +173,14 @@ def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[l
     return fits, misfit
 
 
-def _with_scenes(fits: Sequence[EdgeFit], wide: Sequence[EdgeProfile], coding: Coding) -> tuple[list[EdgeFit], float]:
+def _with_scenes(fits: Sequence[EdgeFit], sight: FlankSight) -> tuple[list[EdgeFit], float]:
     """Fits with what may stand beside the edges, and the probability of nothing; none if that is surely so."""
     # A tone curve with free parameters imitates what stands beside the edges.
-    if not can_tell_beside(wide):
-        return [], 1.0
-    if not fits[0].parameters.size and not is_more_beside(wide, MODEL_ERROR[coding], fits[0].family):
+    if not sight.can_tell or not (fits[0].parameters.size or sight.is_more_beside(fits[0].family)):
         return [], 1.0
     always = [family("linear"), family("srgb")]
-    others = [fit.family for fit in fits if fit.family not in always]
-    found = fit_scenes(wide, DISCREPANCY[coding], always, others)
-    bare = sum(float(p) for p, fit in zip(probabilities(found), found, strict=True) if fit.scene is NOTHING)
+    found = sight.fits(always, [fit.family for fit in fits if fit.family not in always])
+    bare = sum(float(p) for p, fit in zip(probabilities(found), found, strict=True) if not fit.scene.name)
     return ([], 1.0) if bare > SURE or _misfit(found) > MOST_MISFIT else (found, bare)
 
 

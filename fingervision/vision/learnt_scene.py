@@ -1,7 +1,7 @@
 """Learn what stands beside the edges (side walls, bright lines, shadows) from the straight flanks in some frames."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,54 +10,167 @@ from calib.blurred_step import BlurredStep
 from calib.camera_response import CameraResponse
 from calib.edge_fit import EdgeFit
 from calib.edge_profile import EdgeProfile
-from calib.edge_scene import NOTHING
+from calib.edge_response import probabilities
+from calib.edge_scene import SCENES, Scene
 from calib.scene_fit import fit_scenes, is_more_beside
-from calib.tone_curves import fixed_family
-from fingervision.domain.camera import AddedLight, BesideEdges
+from calib.tone_curves import Family, family, fixed_family
+from fingervision.domain.camera import AddedLight, BesideEdges, Origin, ResponseEstimate
 from fingervision.domain.frame import Coding
+from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.flank_profiles import Seen, unclipped_profiles
 
 Floats = NDArray[np.float64]
 
+# Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
+MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.01}
 # Standard deviation of a real edge about the best model, smooth over a pixel, as a share of its contrast: optics
 # (0.003) with what real walls, lines and shadows differ from the models; JPEG of quality 85; H.264.
 DISCREPANCY = {Coding.LOSSLESS: 0.004, Coding.INTRAFRAME: 0.006, Coding.INTERFRAME: 0.012}
+# Steps of the quantiser for the eight frequencies across an edge, as shares of full scale: the luminance table of JPEG
+# (ITU-T T.81, annex K.1, first row) at quality 75, the default of most programs, which halves it.
+STEPS = {Coding.INTRAFRAME: tuple(0.5 * step / 255.0 for step in (16, 11, 10, 16, 24, 40, 51, 61))}
+# Overshoot of an edge (share of its contrast) above which the camera sharpens: sharpening after the tone curve makes
+# the profile even in the levels, and so imitates another response at a perfect fit.
+MOST_OVERSHOOT = 0.03
 # Extent of the profiles beyond the blur (pixels): the light comes back within this distance beside most shadows.
 BESIDE_PX = 12.0
 # Probability of nothing beside the edges above which nothing is learnt.
 SURE = 0.99
 # Extent and spacing of the light that is taken off the lines (pixels), and least weight of a fit that contributes.
 ADDED_PX, ADDED_EVERY_PX, LEAST_WEIGHT = 30.0, 0.1, 1e-3
+# Standard uncertainty of the logarithm of a tip's blur, in general and where light beside the edges widens it.
+U_TIP, U_TIP_LIGHT = 0.15, 0.25
 # Probability of what may lie beyond two standard uncertainties.
 UNCOVERED = 0.05
-# Mean chi-square of a bin above which nothing that is known explains the edges.
-MOST_MISFIT = 1.15
 
 
 def learnt_beside(
-    seen: Sequence[Seen], response: CameraResponse, top_level: int, coding: Coding, noise: float
+    seen: Sequence[Seen], response: ResponseEstimate, top_level: int, coding: Coding, *, are_dark: bool
 ) -> BesideEdges | None:
-    """What stands beside the edges in a recording of dark fingers; None if nothing does or nothing known explains it.
+    """What stands beside the edges in some pictures; None if nothing does.
 
     Parameters
     ----------
     seen : sequence of (ndarray, EdgePoints)
         Pictures turned so that the tips point up, and the steps fitted in them.
-    response : CameraResponse
-        Response of the camera.
+    response : ResponseEstimate
+        Response of the camera; where it is only assumed, plain edges behind another usual tone curve are a rival.
     top_level : int
         Full scale of the pictures.
     coding : Coding
         Compression of the pictures.
-    noise : float
-        Standard deviation of an edge about the best model, independent from place to place (share of the contrast).
+    are_dark : bool
+        Whether the fingers are darker than the ground. On light ones, walls alone are known.
     """
-    profiles = with_structure(unclipped_profiles(seen, top_level, BESIDE_PX), coding)
-    family = fixed_family(response)
-    if not can_tell_beside(profiles) or not is_more_beside(profiles, noise, family):
+    sight, own = FlankSight.of(seen, top_level, coding), fixed_family(response.curve)
+    if not are_dark:
+        sight, own = sight.inverted(response.curve), family("linear")
+    if not sight.is_more_beside(own):
         return None
-    fits = fit_scenes(profiles, DISCREPANCY[coding], [family])
-    return beside_edges(fits, profiles)
+    if response.origin is not Origin.ASSUMED or not are_dark:
+        return beside_edges(sight.fits([own]), sight.profiles)
+    fits = sight.fits([own, *(family(name) for name in ("linear", "srgb") if name != own.name)])
+    elsewhere = sum(
+        float(p)
+        for p, fit in zip(probabilities(fits), fits, strict=True)
+        if fit.family is not own and not fit.scene.name
+    )
+    same = [fit for fit in fits if fit.family is own]
+    return None if elsewhere > 0.5 else beside_edges(same, sight.profiles)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlankSight:
+    """The straight flanks with the ground beside them, as some frames show them.
+
+    Parameters
+    ----------
+    profiles : list of EdgeProfile
+        Profiles of dark fingers.
+    coding : Coding
+        Compression of the pictures.
+    discrepancy : float
+        Standard deviation of an edge about the best model, smooth over a pixel (share of its contrast).
+    blurs_px : (float, float) or None
+        Mean blur of inner flanks and of tips, pixel width included (pixels); None if the tips are not known.
+    scenes : tuple of Scene
+        What may stand beside the edges.
+    """
+
+    profiles: list[EdgeProfile]
+    coding: Coding
+    discrepancy: float
+    blurs_px: tuple[float, float] | None = None
+    scenes: tuple[Scene, ...] = SCENES
+
+    @classmethod
+    def of(cls, seen: Sequence[Seen], top_level: int, coding: Coding) -> "FlankSight":
+        """Flanks as frames show them; see `learnt_beside`."""
+        profiles = with_structure(unclipped_profiles(seen, top_level, BESIDE_PX), coding)
+        flank, tip = np.sqrt(np.mean([edges.blur_px**2 for _, edges in seen], axis=(0, 1)) + PIXEL_VARIANCE)
+        # Pixels that share their noise were processed (digital zoom, noise reduction, compression before), which
+        # changes the edges as well; the discrepancy of a codec that predicts pictures contains this.
+        shared = 1.0 if coding is Coding.INTERFRAME else float(np.median([edges.shared_on_both for _, edges in seen]))
+        return cls(profiles, coding, DISCREPANCY[coding] * shared, (float(flank), float(tip)))
+
+    def inverted(self, response: CameraResponse) -> "FlankSight":
+        """Flanks of light fingers as those of dark ones in the negative of their light."""
+        return replace(
+            self,
+            profiles=[_negative(profile, response) for profile in self.profiles],
+            scenes=tuple(scene for scene in SCENES if scene.name in ("", "wall")),
+        )
+
+    @property
+    def can_tell(self) -> bool:
+        """Whether both inner flanks and an outer one are in view: a wall is told by the flanks that do not show it.
+
+        A camera that sharpens its pictures draws lines beside the edges itself.
+        """
+        inner = sum(not profile.is_outer for profile in self.profiles)
+        return inner == 2 and len(self.profiles) > inner and overshoot(self.profiles) < MOST_OVERSHOOT
+
+    def is_more_beside(self, family: Family) -> bool:
+        """Whether the edges show more than steps of light behind this tone curve."""
+        steps = STEPS.get(self.coding, ())
+        return self.can_tell and is_more_beside(self.profiles, MODEL_ERROR[self.coding], family, steps)
+
+    def fits(self, families: Sequence[Family], others: Sequence[Family] = ()) -> list[EdgeFit]:
+        """Fits of all scenes with the evidence of the tips, the most probable first; see `fit_scenes`.
+
+        A wall is not seen at the tip, and motion does not widen it; shadows and bright lines are seen there as well, if
+        not equally.
+        """
+        fits = fit_scenes(
+            self.profiles, self.discrepancy, families, others, STEPS.get(self.coding, ()), scenes=self.scenes
+        )
+        if self.blurs_px is None:
+            return fits
+        flank, tip = self.blurs_px
+        sigma, disc = np.exp(fits[0].shared[:2])
+        optics = float(np.sqrt(sigma**2 * (1.0 + 0.25 * disc**2) + PIXEL_VARIANCE))
+        on_tip, elsewhere = (
+            -0.5 * float(np.log(tip / expected) / u) ** 2 - float(np.log(u))
+            for expected, u in ((flank, U_TIP_LIGHT), (optics, U_TIP))
+        )
+        found = [
+            replace(fit, log_evidence=fit.log_evidence + (on_tip if fit.scene.is_on_tip else elsewhere)) for fit in fits
+        ]
+        return sorted(found, key=lambda fit: -fit.log_evidence)
+
+
+def _negative(profile: EdgeProfile, response: CameraResponse) -> EdgeProfile:
+    light = np.interp(profile.level, response.level, response.light)
+    slope = np.interp(profile.level, response.level, np.gradient(response.light, response.level))
+    u, structure = slope * profile.u_level, slope * profile.u_structure if profile.u_structure.size else np.zeros(0)
+    return EdgeProfile(
+        -profile.away_px[::-1], 1.0 - light[::-1], u[::-1], -profile.side, profile.is_outer, structure[::-1]
+    )
+
+
+def overshoot(profiles: Sequence[EdgeProfile]) -> float:
+    """How far edges overshoot their plateaus, as a camera that sharpens makes them (share of the contrast)."""
+    return float(np.median([profile.overshoot for profile in profiles]))
 
 
 def with_structure(profiles: Sequence[EdgeProfile], coding: Coding) -> list[EdgeProfile]:
@@ -78,24 +191,16 @@ def with_structure(profiles: Sequence[EdgeProfile], coding: Coding) -> list[Edge
     return [with_mean(profile) for profile in profiles]
 
 
-def can_tell_beside(profiles: Sequence[EdgeProfile]) -> bool:
-    """Whether both inner flanks and an outer one are in view: a wall is told by the flanks that do not show it."""
-    inner = sum(not profile.is_outer for profile in profiles)
-    return inner == 2 and len(profiles) > inner
-
-
 def beside_edges(fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile]) -> BesideEdges | None:
     """Mean over fits of one tone curve by their evidence; None if nothing is there, or nothing known explains it."""
     misfit = max(float(np.mean(fits[0].misfit)), 1.0)
-    if misfit > MOST_MISFIT:
-        return None
     evidence = np.array([fit.log_evidence / misfit + np.log(fit.scene.probability) for fit in fits])
     weight = np.exp(evidence - evidence.max())
     weight /= weight.sum()
-    nothing = sum(float(w) for w, fit in zip(weight, fits, strict=True) if fit.scene is NOTHING)
+    nothing = sum(float(w) for w, fit in zip(weight, fits, strict=True) if not fit.scene.name)
     if nothing > SURE:
         return None
-    best = max(zip(weight, fits, strict=True), key=lambda each: each[0] * (each[1].scene is not NOTHING))[1]
+    best = max(zip(weight, fits, strict=True), key=lambda each: each[0] * bool(each[1].scene.name))[1]
     side = np.array([profile.side for profile in profiles])
     is_outer = np.array([profile.is_outer for profile in profiles])
     # The ground lies to the right of the left finger's inner edge and of the right finger's outer one.
@@ -154,7 +259,7 @@ def _added(
         if fit.scene.has_wall or own < LEAST_WEIGHT:
             continue
         at, share = (each[0] for each in fit.scene.steps(fit.beside[None], side, is_outer))
-        step = BlurredStep.of(fit.shared)
+        step = BlurredStep.of(fit.shared, fit.by_pixels)
         blurred, _ = step.at(side[:, None, None] * (away[:, None] - at[:, None]))
         alone, _ = step.at(side[:, None] * away)
         blurred, alone = 0.5 + side[:, None, None] * (blurred - 0.5), 0.5 + side[:, None] * (alone - 0.5)
@@ -188,7 +293,7 @@ def u_of_rivals_px(fits: Sequence[EdgeFit], probability: Floats, profiles: Seque
     inner = ~np.array([profile.is_outer for profile in profiles])
     sums = np.array([fit.at_px[inner].sum() for fit in fits])
     is_used = np.array([fit.family.name == curve for fit in fits])
-    is_rival = ~is_used & np.array([fit.scene is not NOTHING for fit in fits])
+    is_rival = ~is_used & np.array([bool(fit.scene.name) for fit in fits])
     if not is_used.any():
         return 0.0
     used = float(np.average(sums[is_used], weights=np.maximum(probability[is_used], 1e-300)))

@@ -44,8 +44,8 @@ def flat_noise(
     filters: EdgeFilters,
     row: int,
     column: int,
-) -> tuple[float, float]:
-    """Number of neighbouring lines that share noise (1 for independent lines); standard deviation of the noise.
+) -> tuple[float, float, float]:
+    """Number of neighbouring lines that share noise, also on both sides (1 for independent lines); the noise.
 
     Parameters
     ----------
@@ -64,15 +64,18 @@ def flat_noise(
     -------
     shared : float
         Number of neighbouring lines that count as one.
+    shared_on_both : float
+        The smaller number of finger and ground: a shadow or texture lies on one side, and what was done to the picture
+        on both.
     noise : float
         Standard deviation of the light in the flat parts; 0 if no flat part is in view.
     """
     corners = np.empty((4 * MOST_ALONG, 3), dtype=np.int64)
     corners = corners[: _squares(lines.fixed, lines.coarse, lines.weight, filters.reach_px, *upright.shape, corners)]
     if not len(corners):
-        return 1.0, 0.0
+        return 1.0, 1.0, 0.0
     weight = filters.shift[row, column]
-    shared, quietest = 1.0, 0.0
+    found, quietest = [1.0, 1.0], 0.0
     for side in (GROUND, FINGER):
         covariance, pixels = _autocovariance(upright, light, corners, side, NEAREST)
         variance = covariance[LAGS, LAGS] / max(pixels, 1.0)
@@ -86,8 +89,8 @@ def flat_noise(
         # The standard uncertainty of a correlation of white noise is the inverse root of the number of pixels.
         limit = 1.0 + SIGNIFICANT * float(np.sqrt(2.0 * LAGS / pixels))
         for ratio in (_shared(correlation, weight), _shared(correlation.T.copy(), weight)):
-            shared = max(shared, ratio) if ratio > limit else shared
-    return shared, float(np.sqrt(quietest))
+            found[side] = max(found[side], ratio) if ratio > limit else found[side]
+    return max(found), min(found), float(np.sqrt(quietest))
 
 
 def _is_any(covariance: Floats, limit: float) -> bool:

@@ -3,10 +3,9 @@
 Only the module `pipeline` determines the order of the steps.
 """
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import hypot, isnan, sqrt
+from math import isnan, sqrt
 from typing import Any
 
 import cv2
@@ -22,17 +21,18 @@ from fingervision.domain.status import Status
 from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges, local_change
 from fingervision.vision.coded_picture import CodedPicture, coded_picture
-from fingervision.vision.defect_pixels import repaired
-from fingervision.vision.edge_moves import STEPS_ALONE, moved_by_recording, stated_marks
+from fingervision.vision.defect_pixels import blanked, repaired
+from fingervision.vision.edge_moves import STEPS_ALONE, moved_by_recording
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
+from fingervision.vision.flank_profiles import Seen
+from fingervision.vision.frame_profiles import with_frame_profiles
 from fingervision.vision.gap import LEAST_SURE_PX, TOO_ROUGH, measure_gap
 from fingervision.vision.grey import GreyImage, denoise, full_scale, to_grey, top_level
 from fingervision.vision.held_part import visible_lines
 from fingervision.vision.interlace import at_half_way
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
 from fingervision.vision.picture_memory import keep_picture_memory
-from fingervision.vision.profile_choice import STRIP, with_profile
 from fingervision.vision.profile_lines import profile_lines
 from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import u_gap_response_px
@@ -41,7 +41,7 @@ from fingervision.vision.settings import LINEAR_CAMERA, Settings
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
-__all__ = ["LINEAR_CAMERA", "Settings", "look_closely", "measure_frame", "region_of_interest", "steps"]
+__all__ = ["LINEAR_CAMERA", "Settings", "look_closely", "measure_frame", "region_of_interest", "steps", "steps_alone"]
 
 # Least contrast between the two classes of a picture, as a share of full scale.
 CONTRAST_FLOOR = 0.03
@@ -109,6 +109,23 @@ def look_closely(
         settings = replace(settings, camera=replace(settings.camera, beside=STEPS_ALONE))
     attempt = _attempt(_measured_levels(frame, settings), settings, coded_picture(frame, settings))
     return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
+
+
+def steps_alone(frame: Frame, settings: Settings) -> tuple[Seen, bool] | None:
+    """Picture and fitted steps of a frame with a gap, and whether its fingers are darker than the ground.
+
+    Parameters
+    ----------
+    frame : Frame
+        The picture.
+    settings : Settings
+        Settings of the user.
+    """
+    outcome, fingers, edges = look_closely(frame, settings, only_steps=True)
+    if not isinstance(outcome, GapMeasurement) or fingers is None or edges is None:
+        return None
+    grey = region_of_interest(blanked(to_grey(frame.pixels), settings.camera.defects), settings.region)
+    return (fingers.orientation.view(grey), edges), outcome.light_gap
 
 
 def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
@@ -251,18 +268,10 @@ def _edges_and_gap(
 
     may_be_sharpened = settings.camera.sharpening.origin is Origin.ASSUMED
     beside = settings.camera.beside
-    if beside is not None and _is_told_beside(settings.camera):
+    if not _is_told_beside(settings.camera):
+        edges = with_frame_profiles(upright, edges, light, top, displaced_px, may_be_sharpened=may_be_sharpened)
+    if beside is not None:
         edges = moved_by_recording(upright, edges, light, beside, settings.is_outline)
-    else:
-        with suppress(np.linalg.LinAlgError):  # no model describes the structure beside the edges
-            edges = with_profile(
-                upright, edges, light, top, settings.is_outline, displaced_px, may_be_sharpened=may_be_sharpened
-            )
-        if beside is not None:
-            u_px = [hypot(mark.shift_px, 0.5 * beside.u_gap_px) for mark in edges.marks]
-            edges = replace(edges, marks=stated_marks(edges, u_px))
-    if edges.beside == STRIP:
-        return edges, THIRD_TONE
     edges = with_stripes(upright, edges, light)
     outcome = measure_gap(fingers, edges, settings.below_tip_px, top, light_gap, coded.coding)
     if isinstance(outcome, GapMeasurement):
@@ -274,7 +283,7 @@ def _edges_and_gap(
 
 def _is_told_beside(camera: CameraModel) -> bool:
     """Whether the recording has told what stands beside the edges, so that a frame need not."""
-    return camera.beside is not None and (bool(camera.beside.name) or camera.beside is STEPS_ALONE)
+    return camera.beside is not None and camera.beside.probability > 0.5
 
 
 def _with_two_tones(

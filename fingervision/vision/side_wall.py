@@ -1,13 +1,8 @@
-"""Side walls of thick parts, which widen the inner flanks of both fingers but not the outer ones: limit, correction.
+"""Side walls of thick parts that only the width of the flanks indicates: how far they may have moved the edges.
 
 A wall of breadth w whose light is a share s of the step's adds s (1 - s) w^2 to the variance of the flank's spread, and
-puts a single fitted step (1 - s) w beyond the finger's own edge. If the wall is narrower than the blur, or the flank
-too curved for a mean profile, only the variance that the wall adds indicates the wall. The outer flanks would
-distinguish a wall from motion; if they are out of view, the flanks can be compared only with the tips.
-
-Uneven light makes one flank of a finger appear wider and the other flank sharper: light that increases with the
-distance from an edge widens the step, light that decreases sharpens it. The slope of a straight line, fitted on each
-side beyond the blur, is subtracted where widths are compared.
+puts a single fitted step (1 - s) w beyond the finger's own edge. The outer flanks distinguish a wall from motion; if
+they are out of view, the flanks can be compared only with the tips.
 
 For a step of contrast A blurred by sigma, the derivative of a line's light with respect to position has the squared
 norm A^2 / (2 sqrt(pi) sigma), and the derivative with respect to sigma has half this squared norm. Noise of standard
@@ -17,29 +12,20 @@ displace the edge by d, or widen the edge by sqrt(2) d with the same squared err
 """
 
 from collections.abc import Callable
-from dataclasses import replace
-from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.vision.edge_filters import LEAST_RESOLVED_BLUR_PX, PIXEL_VARIANCE
-from fingervision.vision.edge_moves import are_of_size, beyond_wall, moved_by_wall, moved_edges, with_blur
 from fingervision.vision.edges import EdgePoints
-from fingervision.vision.mean_profile import BIN_PX, FEWEST_ROWS, MeanProfile
+from fingervision.vision.mean_profile import FEWEST_ROWS
 from fingervision.vision.median import median
 from fingervision.vision.profile_lines import INNER, IS_INNER, IS_ROW, ROWS
-from fingervision.vision.profile_models import STEP, WALL, Flank, best_fit
 
 Floats = NDArray[np.float64]
 # Function that returns the standard uncertainty, due to a codec, of the positions of the left and of the right finger's
 # edges (pixels).
 Displacement = Callable[[EdgePoints], tuple[float, float]]
-
-
-def not_displaced(_edges: EdgePoints) -> tuple[float, float]:
-    """Displacement of edges (px) by the codec of an uncompressed picture, which is zero."""
-    return 0.0, 0.0
 
 
 def u_squared_blur(edges: EdgePoints, displaced_px: tuple[float, float]) -> Floats:
@@ -148,91 +134,3 @@ def is_surely_broader(edges: EdgePoints, displaced_px: Displacement) -> NDArray[
 def _u_excess(edges: EdgePoints, displaced_px: Displacement) -> Floats:
     """Standard uncertainty of the excess of each flank's squared spread over its tip's, shape (2,) (pixels squared)."""
     return np.asarray(np.hypot(*u_squared_blur(edges, displaced_px(edges)).T))
-
-
-# Distance from the middle of the edge (in blurs) beyond which the edge has no effect, and least number of bins beyond
-# this distance to which a slope is fitted.
-BEYOND_BLURS, FEWEST_BINS = 2.5, 6
-
-
-def levelled(profile: MeanProfile, blur_px: float) -> MeanProfile:
-    """Return the profile without the slope of the light inside and outside of the edge.
-
-    Parameters
-    ----------
-    profile : MeanProfile
-        Mean light across a flank.
-    blur_px : float
-        Blur of the flank, pixel width included.
-    """
-    light = profile.light
-    for side in (-1.0, 1.0):
-        away = side * profile.t
-        is_beyond = away > BEYOND_BLURS * blur_px
-        if np.count_nonzero(is_beyond) >= FEWEST_BINS:
-            slope = np.polyfit(away[is_beyond], profile.light[is_beyond], 1, w=np.sqrt(profile.count[is_beyond]))[0]
-            light = light - slope * np.maximum(away, 0.0)
-    return replace(profile, light=light)
-
-
-def u_squared_width(profile: MeanProfile, weight: float, blur_px: float, displaced_px: float) -> float:
-    """Standard uncertainty of the squared width (px^2) of a profile's edge, from noise and codec.
-
-    The head of the module derives the formula.
-
-    Parameters
-    ----------
-    profile : MeanProfile
-        Mean light across a flank.
-    weight : float
-        Inverse of the variance of the light of one pixel.
-    blur_px : float
-        Blur of the flank, pixel width included.
-    displaced_px : float
-        Standard uncertainty of the edge's position due to a codec (pixels).
-    """
-    lines = float(profile.count.mean()) / BIN_PX
-    by_noise = np.sqrt(4.0 * np.sqrt(np.pi) * blur_px / (lines * weight)) / float(np.ptp(profile.light))
-    return 2.0 * blur_px * float(np.hypot(by_noise, np.sqrt(2.0) * displaced_px))
-
-
-# Least reduction of chi-square by a wall, compared with a step.
-SIGNIFICANT = 30.0
-# Relative standard uncertainties of a correction for a wall: the first because a wall's tone is not exactly uniform;
-# the second if only the width of the flanks indicates the wall, so that two standard uncertainties include no wall.
-U_WALL, U_HIDDEN_WALL = 0.1, 0.5
-
-
-def with_narrow_wall(
-    edges: EdgePoints,
-    inner: list[Flank],
-    outer: list[MeanProfile],
-    enough: float,
-    is_outline: bool,
-    displaced_px: Displacement,
-) -> EdgePoints | None:
-    """Edges corrected for side walls that widen the inner flanks; None if the outer flanks are equally wide.
-
-    Motion and defocus widen the outer flanks as well. Only the width of the flanks indicates a wall narrower than the
-    blur; the correction for such a wall has half of its value as standard uncertainty.
-    """
-    inside, widths, wide, u_more = [], [], [], []
-    for (profile, weight, blur), beyond, by_codec in zip(inner, outer, displaced_px(edges), strict=True):
-        own, other = levelled(profile, blur), levelled(beyond, blur)
-        inside.append((own, weight, blur))
-        wide.append(best_fit(STEP, own, weight, blur))
-        widths.append(best_fit(STEP, other, weight, blur).blur)
-        u_own, u_other = (u_squared_width(p, weight, blur, by_codec) for p in (own, other))
-        u_more.append(hypot(u_own, u_other))
-    more = [step.blur**2 - width**2 for step, width in zip(wide, widths, strict=True)]
-    if any(each < max(WIDER * width**2, SURE * u) for each, width, u in zip(more, widths, u_more, strict=True)):
-        return None
-    narrow = [best_fit(WALL, own, weight, width, True) for (own, weight, _), width in zip(inside, widths, strict=True)]
-    remains = sum(fit.squares for fit in narrow)
-    if remains > enough or not are_of_size(narrow, -1.0):
-        return None
-    is_shown = remains < sum(step.squares for step in wide) - SIGNIFICANT
-    chosen = [beyond_wall(fit) for fit in narrow] if is_outline else narrow
-    return with_blur(
-        moved_edges(edges, chosen, U_WALL if is_shown else U_HIDDEN_WALL, moved_by_wall(edges), "wall"), widths
-    )

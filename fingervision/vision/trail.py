@@ -7,7 +7,7 @@ trail displaces the fitted step backwards by its mean length. The side tells a t
 the two flanks of a finger a trail points the same way in the picture, a wall, shadow or glare to opposite ways.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,8 @@ SPACING_PX, NO_TRAIL = np.gradient(TRIED_PX), LENGTHS_PX.size
 TAIL_BLURS = 2.2
 # Gauss-Newton steps for position and blur at each length, and least blur (pixels).
 LOOKS, LEAST_BLUR_PX = 5, 0.35
+# Standard deviation of a real edge about the models, as a share of its contrast (half-pixel bins).
+DISCREPANCY = 0.004
 # Number of parameters of the model (level, contrast, tail, position, blur, length).
 PARAMETERS = 6
 # Reductions of chi-square above which one finger, or both together, have a trail: three standard uncertainties. Each
@@ -36,24 +38,7 @@ PARAMETERS = 6
 SURE_OF_ONE, SURE_OF_BOTH, LEAST_SHARE = 9.0, 11.8, 0.1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Trail:
-    """Edges with the uncertainty that a trail means.
-
-    Parameters
-    ----------
-    edges : EdgePoints
-        The edges.
-    is_on_each_flank : bool
-        Whether each flank of a finger shows the trail by itself. If not, a wall or a shadow is tried first: a wall on
-        the inner flank beside a slight asymmetry of the outer one was taken for a trail (2.5 px of error).
-    """
-
-    edges: EdgePoints
-    is_on_each_flank: bool
-
-
-def with_trail(edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur: list[float]) -> Trail | None:
+def with_trail(edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur: list[float]) -> EdgePoints | None:
     """Edges with the uncertainty that a trail behind the fingers means; None if there is no trail.
 
     The fitted step is at the mean position over the mixed pictures, and the edge of the last picture is one mean length
@@ -73,7 +58,6 @@ def with_trail(edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur
     weight = 1.0 / edges.noise_flat**2
     lengths: list[float | None] = []
     gains: list[float] = []
-    sure_gains: list[float] = []
     for (inner, outer), width in zip(profiles, blur, strict=True):
         if inner is None or outer is None:  # one flank alone does not tell a trail from a shadow or a wall
             lengths.append(None)
@@ -85,16 +69,14 @@ def with_trail(edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur
         lengths.append(float(likely @ TRIED_PX / likely.sum()))
         gain = each[:, NO_TRAIL] - each[:, int(np.argmin(squares))]
         gains.append(float(gain.sum()) if gain.min() > LEAST_SHARE * gain.sum() else -np.inf)
-        sure_gains.append(gains[-1] if gain.min() > SURE_OF_ONE else -np.inf)
     if not _is_enough(gains):
         return None
-    on_each = _is_enough(sure_gains)
     known = [length for length in lengths if length is not None]
     if len(known) < len(lengths):  # the other finger may move in the same way, or in the opposite way
-        return Trail(unsure_edges(edges, [abs(known[0])] * len(lengths), "trail"), on_each)
+        return unsure_edges(edges, [abs(known[0])] * len(lengths), "trail")
     # With their signs: optics that spread light to one side of every edge (coma) do not change the gap.
     marks = stated_marks(edges, [length / np.sqrt(3.0) for length in known])
-    return Trail(replace(edges, marks=marks, beside="trail"), on_each)
+    return replace(edges, marks=marks, beside="trail")
 
 
 def _is_enough(gains: list[float]) -> bool:
@@ -114,7 +96,8 @@ def trail_squares(profile: MeanProfile, weight: float, blur: float) -> Floats:
     blur : float
         Blur of the fitted single step (pixels).
     """
-    t, root = profile.t, np.sqrt(profile.count * weight)
+    t, own = profile.t, DISCREPANCY * float(np.ptp(profile.light))
+    root = 1.0 / np.sqrt(1.0 / (profile.count * weight) + own**2)
     length = TRIED_PX[:, None]
     place, width = -TRIED_PX.copy(), np.sqrt(np.maximum(blur**2 - TRIED_PX**2, (0.5 * blur) ** 2))
     squares = np.full(TRIED_PX.size, np.inf)

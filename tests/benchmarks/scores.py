@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import Settings
+from fingervision.vision.single_picture import measure_picture
 
 Floats = NDArray[np.float64]
 BEYOND_PX = 0.25
@@ -37,7 +38,7 @@ class Scores:
     def measure(self, frame: Frame, settings: Settings, gap_px: float) -> None:
         """Measure a frame of known gap."""
         begun = time.process_time()
-        outcome = measure_frame(frame, settings)
+        outcome = measure_picture(frame, settings)
         self.seconds += time.process_time() - begun
         self.take(outcome, gap_px)
 

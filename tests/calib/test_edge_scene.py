@@ -37,6 +37,10 @@ def shadow(t: Floats, is_outer: bool) -> Floats:
     return nothing(t, is_outer) * np.where(t > 0.0, 1.0 - 0.35 * np.clip(1.0 - t / 7.0, 0.0, 1.0), 1.0)
 
 
+def contact(t: Floats, is_outer: bool) -> Floats:
+    return nothing(t, is_outer) * np.where(t > 0.0, 1.0 - 0.5 * np.exp(-np.maximum(t, 0.0) / 4.0), 1.0)
+
+
 def wall_and_line(t: Floats, is_outer: bool) -> Floats:
     return wall(t, is_outer) + np.where((t < -1.0) & (t > -2.2), 0.4, 0.0)
 
@@ -60,8 +64,8 @@ def profiles(light: Callable[[Floats, bool], Floats], at_px: float, rng: np.rand
 
 @pytest.mark.parametrize(
     ("light", "name"),
-    [(wall, "wall"), (line, "glare"), (shadow, "shadow"), (wall_and_line, "glare and wall")],
-    ids=["wall", "line", "shadow", "wall and line"],
+    [(wall, "wall"), (line, "glare"), (shadow, "shadow"), (contact, "shadow"), (wall_and_line, "glare and wall")],
+    ids=["wall", "line", "shadow", "contact shadow", "wall and line"],
 )
 def test_the_edge_is_found_beside_what_displaces_a_step(light: Callable[[Floats, bool], Floats], name: str) -> None:
     rng = np.random.default_rng(21)
@@ -80,12 +84,25 @@ def test_the_edge_is_found_beside_what_displaces_a_step(light: Callable[[Floats,
     assert u_px.max() < 0.3
 
 
+@pytest.mark.parametrize("width_px", [4.0, 9.0])
+def test_light_that_is_spread_evenly_displaces_nothing(width_px: float) -> None:
+    """Motion during the exposure, or a filter of the camera: half of the light on either side, on all flanks alike."""
+
+    def spread(t: Floats, is_outer: bool) -> Floats:
+        return DARK + (LIGHT - DARK) * np.clip(0.5 + t / width_px, 0.0, 1.0)
+
+    seen = profiles(spread, 0.3, np.random.default_rng(23))
+    fits = fit_scenes(seen, 0.004, [family("linear")])
+    assert not fits[0].scene.name
+    assert np.abs(fits[0].at_px - 0.3).max() < 0.1
+
+
 def test_a_bare_edge_is_no_reason_to_look_for_more() -> None:
     rng = np.random.default_rng(22)
     seen = profiles(nothing, 0.3, rng)
     assert not is_more_beside(seen, 0.001, family("linear"))
     fits = fit_scenes(seen, 0.003, [family("linear")])
-    assert fits[0].scene is NOTHING
+    assert not fits[0].scene.name
     assert fits[0].at_px == pytest.approx(0.3, abs=0.06)
 
 

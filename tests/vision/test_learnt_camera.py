@@ -16,7 +16,7 @@ from calib.tone_curves import family, fixed_family
 from fingervision.domain.camera import ASSUMED_CAMERA, ResponseEstimate, stated_camera
 from fingervision.domain.frame import Coding
 from fingervision.vision.learnt_camera import learnt_from_profiles
-from fingervision.vision.learnt_scene import DISCREPANCY, beside_edges, less_sure
+from fingervision.vision.learnt_scene import DISCREPANCY, FlankSight, beside_edges, less_sure
 from fingervision.vision.response_shift import edge_shift_px, u_edge_px
 from tests.calib.test_edge_scene import chamfer, nothing
 from tests.calib.test_edge_scene import profiles as scene_profiles
@@ -146,7 +146,9 @@ def test_a_chamfer_that_a_tone_curve_imitates_is_in_the_uncertainty(seed: int) -
         for each in wide
         for near in (np.abs(each.away_px) < 8.0,)
     ]
-    camera = learnt_from_profiles(narrow, ASSUMED_CAMERA, Coding.LOSSLESS, wide)
+    camera = learnt_from_profiles(
+        narrow, ASSUMED_CAMERA, Coding.LOSSLESS, FlankSight(wide, Coding.LOSSLESS, DISCREPANCY[Coding.LOSSLESS])
+    )
     assert camera.beside is not None
     fits = fit_scenes(wide, DISCREPANCY[Coding.LOSSLESS], [fixed_family(camera.response.curve)])
     beside = less_sure(beside_edges(fits, wide), camera.beside.u_gap_px)
@@ -170,4 +172,12 @@ def test_other_tone_curves_are_no_rivals_of_a_stated_one() -> None:
         for each in wide
         for near in (np.abs(each.away_px) < 8.0,)
     ]
-    assert learnt_from_profiles(narrow, stated_camera(response), Coding.LOSSLESS, wide).beside is None
+    assert (
+        learnt_from_profiles(
+            narrow,
+            stated_camera(response),
+            Coding.LOSSLESS,
+            FlankSight(wide, Coding.LOSSLESS, DISCREPANCY[Coding.LOSSLESS]),
+        ).beside
+        is None
+    )

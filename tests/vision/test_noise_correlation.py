@@ -61,7 +61,7 @@ def test_noise_of_a_known_kernel(kernel: np.ndarray) -> None:
         smooth = cv2.filter2D(noise, -1, kernel[:, None], borderType=cv2.BORDER_REFLECT)
         picture = np.rint(30000.0 + smooth).astype(np.uint16)
         filters = edge_filters(8)
-        shared, sigma = flat_noise(picture, np.arange(float(LEVELS)), lines(), filters, *filters.middle(1.0))
+        shared, _, sigma = flat_noise(picture, np.arange(float(LEVELS)), lines(), filters, *filters.middle(1.0))
         # A variance from n values with this correlation scatters by 2 sum rho^2 / n, the quieter of two sides is taken.
         own = np.correlate(kernel, kernel, "full") / np.sum(kernel**2)
         assert sigma == pytest.approx(

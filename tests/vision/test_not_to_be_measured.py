@@ -7,7 +7,8 @@ import pytest
 
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import Settings
+from fingervision.vision.single_picture import measure_picture
 from tests.benchmarks.scenes.bench_things import THINGS
 from tests.benchmarks.scenes.canvas import Canvas
 from tests.benchmarks.scenes.gripper import BELOW_PX
@@ -31,7 +32,7 @@ def painted(pair: tuple[Finger, Finger]) -> Canvas:
 
 def measured(canvas: Canvas, turns: int = 0) -> GapMeasurement | NoGap:
     picture = canvas.shot(1.0, 2.0, np.random.default_rng(7))
-    return measure_frame(Frame(np.ascontiguousarray(np.rot90(picture, turns)), 0), SETTINGS)
+    return measure_picture(Frame(np.ascontiguousarray(np.rot90(picture, turns)), 0), SETTINGS)
 
 
 @pytest.mark.parametrize("turns", [0, 1])
@@ -80,7 +81,7 @@ def test_a_shadow_on_one_inner_side_is_no_motion() -> None:
 def test_things_on_a_bench_are_right_or_refused(name: str) -> None:
     for k in range(2):
         shot = THINGS[name](np.random.default_rng([17, zlib.crc32(name.encode()), k]))
-        found = measure_frame(Frame(shot.picture, 0), SETTINGS)
+        found = measure_picture(Frame(shot.picture, 0), SETTINGS)
         if isinstance(found, GapMeasurement):
             assert shot.gap_px is not None
             u = np.hypot(found.u_gap_px, found.u_shift_px)

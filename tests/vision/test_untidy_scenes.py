@@ -11,7 +11,8 @@ import pytest
 from fingervision.domain.frame import Frame, Region
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
-from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings
+from fingervision.vision.single_picture import measure_picture
 from tests.benchmarks.scenes.canvas import Canvas
 from tests.benchmarks.scenes.clutter import CLUTTER, Scene
 from tests.benchmarks.scenes.empty import DRAWN
@@ -38,7 +39,7 @@ def drawn(name: str, number: int = 2, seed: int = 91) -> list[np.random.Generato
 def test_a_gripped_part_never_gives_a_wrong_gap(name: str) -> None:
     for rng in drawn(name, 3):
         shot = GRIPPED[name](rng)
-        found = measure_frame(Frame(shot.picture, 0), SETTINGS)
+        found = measure_picture(Frame(shot.picture, 0), SETTINGS)
         if isinstance(found, GapMeasurement):
             assert not is_wrong(shot, found), (found.gap_px, shot.gap_px)
         if found.held is not None:
@@ -48,21 +49,21 @@ def test_a_gripped_part_never_gives_a_wrong_gap(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["bar-at", "disc-at", "bar-hangs-out-above"])
 def test_hidden_inner_edges_are_gripping_with_the_width_of_the_part(name: str) -> None:
-    outcomes = [measure_frame(Frame(GRIPPED[name](rng).picture, 0), SETTINGS) for rng in drawn(name, 4, 92)]
+    outcomes = [measure_picture(Frame(GRIPPED[name](rng).picture, 0), SETTINGS) for rng in drawn(name, 4, 92)]
     assert sum(found.status is Status.GRIPPING and found.held is not None for found in outcomes) >= 3
 
 
 @pytest.mark.parametrize(("name", "number"), [("bar-other-tone", 3), ("bar-hangs-out-above", 18)])
 def test_the_notch_between_a_rounded_finger_and_a_part_that_protrudes_is_no_gap(name: str, number: int) -> None:
     shot = GRIPPED[name](drawn(name, number + 1, 94)[number])
-    found = measure_frame(Frame(shot.picture, 0), SETTINGS)
+    found = measure_picture(Frame(shot.picture, 0), SETTINGS)
     assert not isinstance(found, GapMeasurement) or not is_wrong(shot, found), (found.gap_px, shot.gap_px)
 
 
 def test_a_free_part_between_open_fingers_changes_nothing() -> None:
     for rng in drawn("free", 4):
         shot = GRIPPED["free"](rng)
-        found = measure_frame(Frame(shot.picture, 0), SETTINGS)
+        found = measure_picture(Frame(shot.picture, 0), SETTINGS)
         assert isinstance(found, GapMeasurement), found
         assert found.held is None
         assert not is_wrong(shot, found)
@@ -72,8 +73,8 @@ def test_a_region_moves_the_held_part_with_everything_else() -> None:
     (rng,) = drawn("bar-at", 1, 93)
     picture = np.pad(GRIPPED["bar-at"](rng).picture, ((17, 0), (23, 0)), mode="edge")
     height, width = picture.shape
-    inside = measure_frame(Frame(picture[17:, 23:], 0), SETTINGS)
-    seen = measure_frame(Frame(picture, 0), Settings(BELOW_PX, region=Region(23, 17, width - 23, height - 17)))
+    inside = measure_picture(Frame(picture[17:, 23:], 0), SETTINGS)
+    seen = measure_picture(Frame(picture, 0), Settings(BELOW_PX, region=Region(23, 17, width - 23, height - 17)))
     assert inside.held is not None
     assert seen.held == inside.held.shifted(23.0, 17.0)
 
@@ -81,7 +82,7 @@ def test_a_region_moves_the_held_part_with_everything_else() -> None:
 def test_a_whole_gripper_on_its_base_is_found_without_help() -> None:
     for rng in drawn("whole", 12):
         shot = whole(rng)
-        found = measure_frame(Frame(shot.picture, 0), SETTINGS)
+        found = measure_picture(Frame(shot.picture, 0), SETTINGS)
         assert isinstance(found, GapMeasurement), found
         assert not is_wrong(shot, found)
 
@@ -90,7 +91,7 @@ def test_a_whole_gripper_on_its_base_is_found_without_help() -> None:
 def test_clutter_is_right_or_refused(name: str) -> None:
     for rng in drawn(name):
         shot = CLUTTER[name](rng)
-        found = measure_frame(Frame(shot.picture, 0), SETTINGS)
+        found = measure_picture(Frame(shot.picture, 0), SETTINGS)
         assert isinstance(found, NoGap) or not is_wrong(shot, found), (found, shot.gap_px)
 
 
@@ -102,7 +103,7 @@ def test_a_cut_that_ends_at_the_measuring_height_is_no_fillet() -> None:
         scene = Scene(np.random.default_rng([seed, 95]), is_cut=True, inner_corner_px=9.5, outer_corner_px=9.5)
         scene.paint()
         shot = scene.done()
-        found = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, camera=LINEAR_CAMERA))
+        found = measure_picture(Frame(shot.picture, 0), Settings(BELOW_PX, camera=LINEAR_CAMERA))
         assert isinstance(found, NoGap) or not is_wrong(shot, found)
 
 
@@ -115,7 +116,7 @@ def test_a_cut_finger_beside_a_round_one() -> None:
         scene.pair = cut, replace(own, is_cut=False, inner_corner_px=18.0, outer_corner_px=18.0)
         scene.paint()
         shot = scene.done()
-        found = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX, camera=LINEAR_CAMERA))
+        found = measure_picture(Frame(shot.picture, 0), Settings(BELOW_PX, camera=LINEAR_CAMERA))
         assert isinstance(found, NoGap) or not is_wrong(shot, found)
         values += isinstance(found, GapMeasurement)
     assert values >= 4
@@ -127,14 +128,14 @@ def test_a_cut_finger_beside_a_round_one() -> None:
 )
 def test_what_is_plainly_no_finger_hinders_nothing(name: str) -> None:
     for rng in drawn(name, 4):
-        found = measure_frame(Frame(CLUTTER[name](rng).picture, 0), SETTINGS)
+        found = measure_picture(Frame(CLUTTER[name](rng).picture, 0), SETTINGS)
         assert isinstance(found, GapMeasurement), found
 
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_without_two_fingers_there_is_no_number(name: str) -> None:
     for rng in drawn(name):
-        found = measure_frame(Frame(DRAWN[name](rng).picture, 0), SETTINGS)
+        found = measure_picture(Frame(DRAWN[name](rng).picture, 0), SETTINGS)
         assert isinstance(found, NoGap), found
 
 
@@ -143,7 +144,7 @@ def test_a_camera_that_is_turned_too_far_is_told_so() -> None:
     for side, x, y in ((-1, 250.0, 240.0), (1, 352.0, 298.0)):
         canvas.fill(Finger(x, y, 60.0, 4.0, 4.0, 30.0, side).outline(), 45.0)
     picture = canvas.shot(1.0, 2.0, np.random.default_rng(94))
-    found = measure_frame(Frame(picture, 0), SETTINGS)
+    found = measure_picture(Frame(picture, 0), SETTINGS)
     assert isinstance(found, NoGap), found
     assert "turn the camera" in found.words
     assert "30" in found.words
@@ -156,7 +157,7 @@ def test_two_bars_that_lie_in_view_are_fingers_only_where_they_lie_side_by_side(
     canvas, rng = Canvas(640, 480, 200.0), np.random.default_rng(5)
     for left_px, top_px in ((300 - gap_px // 2 - 40, 150), (300 + gap_px // 2, 150 + step_px)):
         canvas.fill(box(left_px, top_px, left_px + 40, top_px + 110), 60.0)
-    found = measure_frame(Frame(canvas.shot(1.0, 2.0, rng), 0), SETTINGS)
+    found = measure_picture(Frame(canvas.shot(1.0, 2.0, rng), 0), SETTINGS)
     assert isinstance(found, GapMeasurement) == is_pair
     assert not isinstance(found, GapMeasurement) or abs(found.gap_px - gap_px) < 0.1
 
@@ -171,5 +172,5 @@ def test_the_spaces_of_a_letter_are_no_fingers() -> None:
     canvas.fill(box(290, 180, 400, 205), 200.0)
     for arm_px in (290, 333, 376):
         canvas.fill(box(arm_px, 180, arm_px + 24, 290), 200.0)
-    found = measure_frame(Frame(canvas.shot(1.0, 2.0, rng), 0), SETTINGS)
+    found = measure_picture(Frame(canvas.shot(1.0, 2.0, rng), 0), SETTINGS)
     assert isinstance(found, NoGap), found

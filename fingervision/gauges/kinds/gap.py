@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from math import ceil
 from typing import Annotated
 
+from fingervision.domain.camera import BesideEdges
 from fingervision.domain.field import Field
 from fingervision.domain.frame import Region
 from fingervision.domain.gap import GapMeasurement
@@ -11,7 +12,8 @@ from fingervision.gauges.common_keys import LONGEST_PX, Placed
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
-from fingervision.vision.pipeline import measure_frame
+from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.single_picture import beside_in
 
 QUANTITIES = (("gap", "length"),)
 # Smallest region that can contain two fingers and the edges between them (`fingervision.vision.pipeline` refuses
@@ -42,6 +44,8 @@ class FollowedGap:
         self._spec = spec
         self._middle: tuple[float, float] | None = None
         self._moved = (0, 0)
+        self._looks = True
+        self._beside: BesideEdges | None = None
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
@@ -52,7 +56,7 @@ class FollowedGap:
             region.x_px, region.y_px, region.x_px + region.width_px - 1, region.y_px + region.height_px - 1,
         )  # fmt: skip
         zone = Mark(((x, y), (right, y), (right, bottom), (x, bottom), (x, y)))
-        found = measure_frame(picture.frame, replace(picture.settings, region=region))
+        found = measure_frame(picture.frame, self._with_beside(picture, replace(picture.settings, region=region)))
         if not isinstance(found, GapMeasurement):
             return Reading(GaugeStatus(found.status.value), zone=zone, words=found.words)
         first, second = ((edge.x_px, edge.y_px) for edge in (found.left, found.right))
@@ -64,6 +68,14 @@ class FollowedGap:
         # `u_picture_px` applies to the whole gap, and half of it to each edge; other shifts are part of `u_gap_px`.
         quantity = Distance(first, second, found.u_gap_px, polarity, 0.5 * found.u_picture_px)
         return Reading(GaugeStatus.OK, (quantity,), (Mark((first, second)),), zone)
+
+    def _with_beside(self, picture: Picture, settings: Settings) -> Settings:
+        """Settings with what stands beside the edges: of the recording, or as the first picture shows it."""
+        if settings.camera.beside is not None:
+            return settings
+        if self._looks:
+            self._looks, self._beside = False, beside_in([picture.frame], settings)
+        return replace(settings, camera=replace(settings.camera, beside=self._beside))
 
     def _region(self, picture: Picture) -> Region | None:
         """The present region of the gauge, clipped to the picture."""

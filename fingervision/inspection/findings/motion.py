@@ -7,7 +7,7 @@ from fingervision.inspection.finding import MOSTLY_REFUSED, Finding, refusing, w
 from fingervision.inspection.look import Look
 from fingervision.inspection.noise_bound import GOOD_BLUR_PX
 from fingervision.inspection.sample import Sample
-from fingervision.vision.profile_choice import MOTION_RADIUS_PX
+from fingervision.vision.frame_profiles import MOTION_RADIUS_PX
 
 REMEDY = "Shorten the exposure (with more light, or a flash), or move more slowly while frames are taken."
 FORMULA = (

@@ -11,7 +11,8 @@ REMEDY = (
     "a lens of longer focal length; against glare, use paint or a mask."
 )
 FORMULA = (
-    "u_shift_px: possible shift of the edges caused by structures beside them (vision/profile_choice, edge_profile)"
+    "u_shift_px: possible shift of the edges caused by structures beside them (vision/learnt_scene, frame_profiles, "
+    "edge_profile)"
 )
 
 

@@ -20,7 +20,8 @@ import numpy as np
 
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import Settings
+from fingervision.vision.single_picture import measure_picture
 from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.scenes.bench_things import THINGS
 from tests.benchmarks.scenes.canvas import Rng
@@ -62,7 +63,7 @@ class Tally:
 
 def _take(shot: Shot, tallies: tuple[Tally, Tally]) -> str:
     start = time.perf_counter()
-    found = measure_frame(Frame(shot.picture, 0), Settings(BELOW_PX))
+    found = measure_picture(Frame(shot.picture, 0), Settings(BELOW_PX))
     seconds = time.perf_counter() - start
     words = ""
     for tally in tallies:
