@@ -14,6 +14,8 @@ from fingervision.measuring.task import Task
 
 MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers_are_dark"})
 """Settings whose change invalidates the zero."""
+FINGERS = {"auto": None, "dark": True, "light": False}
+"""Whether the fingers are dark, by the name that settings files and the page give it; None: found in every frame."""
 ZERO_IS_OFF = "The zero was removed, because it was set with another scale, height, region or direction of the tips."
 
 
@@ -62,6 +64,11 @@ class Choices:
             changes.setdefault("zero_mm", 0.0)
         chosen = replace(self, **changes)
         return chosen, bool(self.zero_mm) and chosen.zero_mm == 0.0 and moves_zero
+
+    @property
+    def fingers(self) -> str:
+        """Name of the brightness of the fingers, one of `FINGERS`."""
+        return next(name for name, are_dark in FINGERS.items() if are_dark is self.fingers_are_dark)
 
     @property
     def task(self) -> Task | None:
@@ -142,7 +149,7 @@ class Choices:
             "u_px_per_mm": scale.u_px_per_mm if isinstance(scale, Calibration) else None,
             "region": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
             "tips": "auto" if self.direction is None else self.direction.value,
-            "fingers": {None: "auto", True: "dark", False: "light"}[self.fingers_are_dark],
+            "fingers": self.fingers,
             "below_tip_mm": self.below_tip_mm,
             "least_mm": self.least_mm,
             "greatest_mm": self.greatest_mm,

@@ -19,6 +19,7 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, NoCalibrationError, OutputError, StateError, UsageError
 from fingervision.domain.frame import Region
 from fingervision.domain.gap import GapMeasurement
+from fingervision.live.choices import FINGERS
 from fingervision.live.commands.asking import Answer, Request, box, check_scale, number, number_or_none, seen_of, shown
 from fingervision.live.view import View
 from fingervision.measuring.picture_response import PictureResponse, read_sizes
@@ -93,7 +94,6 @@ def calibrated(references: Sequence[SeenReference], frame_size_px: tuple[int, in
     return read_with.noted(found, shift_px)
 
 
-POLARITIES = ("auto", "dark", "light")
 LEAST_REGION_PX = 8
 """Smallest side of a region that is set on the page, as in `page/dragging.js`: no finger is seen in less."""
 TIPS = ("auto", *(direction.value for direction in Direction))
@@ -120,11 +120,9 @@ def _tips(view: View, request: Request) -> Answer:
 
 def _fingers(view: View, request: Request) -> Answer:
     fingers = request.get("fingers")
-    if fingers not in POLARITIES:
-        raise UsageError(
-            f"The brightness of the fingers must be one of {', '.join(POLARITIES)}, but is {shown(fingers)}."
-        )
-    view.choose(fingers_are_dark={"auto": None, "dark": True, "light": False}[str(fingers)])
+    if str(fingers) not in FINGERS:
+        raise UsageError(f"The brightness of the fingers must be one of {', '.join(FINGERS)}, but is {shown(fingers)}.")
+    view.choose(fingers_are_dark=FINGERS[str(fingers)])
     return Answer()
 
 

@@ -15,6 +15,7 @@ from fingervision.domain.gap import GapMeasurement
 from fingervision.inspection.catalogue import inspect
 from fingervision.inspection.report import as_json
 from fingervision.inspection.sample import take_sample
+from fingervision.live.choices import FINGERS
 from fingervision.live.commands.asking import Answer, Request, check_scale, shown, words
 from fingervision.live.playback.playback import Playback
 from fingervision.live.view import View
@@ -116,7 +117,7 @@ def _save(view: View, request: Request) -> Answer:
             "below_tip_mm": choices.below_tip_mm,
             "tips": "auto" if choices.direction is None else choices.direction.value,
             "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
-            "fingers": {None: "auto", True: "dark", False: "light"}[choices.fingers_are_dark],
+            "fingers": choices.fingers,
         },
     )
     return Answer(f"Settings written to {path}; `measure`, `live`, `inspect` and this page take them.")
@@ -139,7 +140,7 @@ def _load(view: View, request: Request) -> Answer:
     if "tips" in found:
         changes["direction"] = None if found["tips"] == "auto" else Direction(found["tips"])
     if "fingers" in found:
-        changes["fingers_are_dark"] = {"auto": None, "dark": True, "light": False}[found["fingers"]]
+        changes["fingers_are_dark"] = FINGERS[found["fingers"]]
     if "roi" in found:
         changes["region"] = Region(*(int(side) for side in found["roi"].split(",")))
     if "scale" in changes:
