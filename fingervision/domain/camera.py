@@ -238,6 +238,10 @@ class CameraModel:
         Standard deviation of an edge's profile about the best model, as a share of the contrast.
     beside : BesideEdges or None
         What stands beside the edges in the whole recording; None if nothing does or it is not known.
+    usual : tuple of (float, float) or None
+        What the edges show in the frames from which this was learnt (`EdgePoints.unexplained`, `EdgePoints.widened`),
+        each with its standard deviation: a frame with others shows something else beside its edges. None if it was not
+        learnt from a recording.
     """
 
     response: ResponseEstimate = field(default_factory=lambda: assumed_response("linear"))
@@ -249,6 +253,7 @@ class CameraModel:
     defects_origin: Origin = Origin.ASSUMED
     discrepancy: CameraQuantity = DISCREPANCY
     beside: BesideEdges | None = None
+    usual: tuple[tuple[float, float], ...] | None = None
 
 
 ASSUMED_CAMERA = CameraModel()

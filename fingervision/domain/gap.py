@@ -109,6 +109,8 @@ class GapMeasurement:
         Disturbance beside the edges, or which has displaced the edges: wall, shadow, glare (two of these are joined by
         "and"), motion, trail, sharpening;
         empty if none was found.
+    is_unlike : bool
+        Whether the edges show other things beside them than the frames from which the recording's camera was learnt.
     held : HeldPart or None
         The part that the fingers hold; None if no part was found.
     u_coding_px : float
@@ -126,6 +128,7 @@ class GapMeasurement:
     roughness_px: float = 0.0
     fields_apart_px: float = 0.0
     beside: str = ""
+    is_unlike: bool = False
     held: HeldPart | None = None
     u_coding_px: float = 0.0
 

@@ -12,6 +12,7 @@ from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.live.choices import Choices
 from fingervision.live.run_folder import RunFolder
 from fingervision.measuring.camera_learning import WANTED, camera_beside
+from fingervision.measuring.changed_edges import ChangingEdges
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.task import Task
@@ -150,6 +151,7 @@ class FrameMeasurement:
     ) -> None:
         self._frame_size_px, self._files, self._fingers_are_dark = frame_size_px, files, fingers_are_dark
         self._pictures, self._camera = SoundPictures(), LiveCamera(tell, self._measure_again)
+        self._edges = ChangingEdges()
         self._take_again = again
         self.settings: Settings | None = None
         """Settings with which the last frame was measured."""
@@ -195,7 +197,7 @@ class FrameMeasurement:
             settings = replace(settings, fingers_are_dark=self._fingers_are_dark)
         self.settings = settings
         frame = repaired(frame, settings.camera)
-        outcome = self._pictures.judged(frame, measure_frame(frame, settings))
+        outcome = self._pictures.judged(frame, self._edges.measure(frame, settings))
         if isinstance(outcome, GapMeasurement):
             self._camera.add(frame, settings, choices.task, learns=run is None)
         return outcome

@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 
+import numpy as np
+
 from calib.calibration import is_stated
 from calib.measured_scale import Calibration
 from fingervision.domain.camera import CameraModel, Origin
@@ -103,6 +105,9 @@ def _camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None)
     if len(looks) < FEWEST:  # too few phases and too much noise for a tone curve
         return replace(before, beside=beside_in(frames, settings))
     camera = learnt_camera(seen, before, top, coding, are_dark=are_dark)
+    shown = np.array([(edges.unexplained, edges.widened) for _, edges in seen])
+    usual, scatter = np.median(shown, axis=0), np.std(shown, axis=0)
+    camera = replace(camera, usual=((float(usual[0]), float(scatter[0])), (float(usual[1]), float(scatter[1]))))
     if coding is not Coding.INTERFRAME:  # such a codec repeats the noise of the picture before
         lag = temporal_lag([(frame.index, *each) for frame, (each, _) in looks])
         camera = replace(camera, lag=lag)

@@ -18,6 +18,7 @@ from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import Description
 from fingervision.measuring.beside_damage import confirmed_beside_damage
 from fingervision.measuring.camera_learning import Learn, learnt_first
+from fingervision.measuring.changed_edges import ChangingEdges
 from fingervision.measuring.frame_sequence import Judged, in_sequence
 from fingervision.measuring.gap_budget import gap_budget
 from fingervision.measuring.marked import marked
@@ -31,7 +32,7 @@ from fingervision.storage.beside import recorded_camera
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.storage.run_files import lost_frames
 from fingervision.vision.defect_pixels import repaired
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import Settings
 
 # Determine once per recording whether the fingers are darker or lighter than the background.
 #
@@ -67,7 +68,7 @@ def one_polarity(
         Called after every frame; if it returns True no more frames are read, and the frames measured so far are still
         yielded.
     measure : callable or None
-        Measurement of one frame, if not `measure_frame`.
+        Measurement of one frame, if not that of `ChangingEdges`.
 
     Yields
     ------
@@ -75,7 +76,7 @@ def one_polarity(
         Every frame with its result. The first frames with a gap are yielded after all of them have been counted; frames
         without a gap before them are yielded at once.
     """
-    source, measure = iter(frames), measure or measure_frame
+    source, measure = iter(frames), measure or ChangingEdges().measure
     if settings.fingers_are_dark is None:
         kept: list[tuple[Frame | LostFrame, Outcome]] = []
         pixels = 0
@@ -218,7 +219,7 @@ def measure_frames(
     on_progress : callable or None
         Called at intervals with the number of frames done and the number that the source announces.
     measure : callable or None
-        Measurement of one frame after the camera has been learnt, if not `measure_frame`.
+        Measurement of one frame after the camera has been learnt, if not that of `ChangingEdges`.
     learn : callable or None
         What learns the camera from the first frames, if not `camera_of`.
 

@@ -17,12 +17,13 @@ from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.frames.source import Description
 from fingervision.measuring.camera_learning import Learn
+from fingervision.measuring.changed_edges import ChangingEdges
 from fingervision.measuring.frame_loop import measure_frames, prepared
 from fingervision.measuring.rows import Result
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.task import Task
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import Settings, contradicts
 
 # Memory (bytes) and least number of frames that wait for the measurement: the camera is learnt in half a second on a
 # quiet machine, and in five where a wall, a line or a shadow stands beside the edges; the video is written meanwhile.
@@ -61,6 +62,7 @@ class RunTable:
             max(FRAMES_WAITING, MEMORY_WAITING // (description.width_px * description.height_px))
         )
         self._seen: dict[int, tuple[Coding, Measured]] = {}
+        self._edges = ChangingEdges()
         self._failure: Exception | None = None
         self._learnt = Event()
         self._thread = Thread(target=self._measure, name="Table", daemon=True)
@@ -120,9 +122,9 @@ class RunTable:
         self.camera = settings.camera
         self._learnt.set()
         coding, seen = self._seen.pop(frame.index, (None, None))
-        if seen is not None and coding is frame.coding and _holds(*seen, settings):
+        if seen is not None and coding is frame.coding and _holds(*seen, settings) and not contradicts(seen[1]):
             return seen[1]
-        return measure_frame(frame, settings)
+        return self._edges.measure(frame, settings)
 
 
 def _holds(known: Settings, outcome: GapMeasurement | NoGap, settings: Settings) -> bool:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.loops import loop
 from fingervision.vision.edge_filters import (
+    PIXEL_VARIANCE,
     SMALLEST_BLUR_PX,
     EdgeFilters,
     Lines,
@@ -104,6 +105,17 @@ class EdgePoints:
     shared_on_both: float = 1.0
     noise_flat: float = 0.0
     beside: str = ""
+
+    @property
+    def unexplained(self) -> float:
+        """Squared residuals of the fitted steps over the noise of the picture's flat parts."""
+        return (self.noise / self.noise_flat) ** 2 if self.noise_flat > 0.0 else 1.0
+
+    @property
+    def widened(self) -> float:
+        """Squared blur of the flanks over that of the tips, pixel width included."""
+        flank, tip = np.mean(self.blur_px**2, axis=0) + PIXEL_VARIANCE
+        return float(flank / tip)
 
 
 def fit_edges(upright: GreyImage, lines: ProfileLines, light: Floats, top_level: int) -> EdgePoints:

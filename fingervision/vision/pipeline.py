@@ -41,7 +41,16 @@ from fingervision.vision.settings import LINEAR_CAMERA, Settings
 from fingervision.vision.stripes import with_stripes
 from fingervision.vision.third_tone import THIRD_TONE, other_threshold
 
-__all__ = ["LINEAR_CAMERA", "Settings", "look_closely", "measure_frame", "region_of_interest", "steps", "steps_alone"]
+__all__ = [
+    "LINEAR_CAMERA",
+    "Settings",
+    "contradicts",
+    "look_closely",
+    "measure_frame",
+    "region_of_interest",
+    "steps",
+    "steps_alone",
+]
 
 # Least contrast between the two classes of a picture, as a share of full scale.
 CONTRAST_FLOOR = 0.03
@@ -53,6 +62,9 @@ FINAL = (Status.SATURATED, Status.BLURRED, Status.GRIPPING)
 # Largest standard uncertainty (pixels) of a gap that is measured beside a shadow or pad with another threshold; a
 # larger uncertainty suggests that other edges were measured.
 LEAST_SURE_AGAIN_PX = 0.3
+# Standard deviations by which what a frame's edges show differs from the usual if something else stands beside them,
+# and least relative differences of the squared residuals and of the flanks' squared blur.
+UNLIKE_SIGMAS, LEAST_UNLIKE = 5.0, (0.3, 0.06)
 UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: no object differs from the background.")
 
 
@@ -266,6 +278,7 @@ def _edges_and_gap(
     def displaced_px(found: EdgePoints) -> tuple[float, float]:
         return coded.flanks_displaced_px(upright, found, fingers.orientation, light, top)
 
+    is_unlike = _is_unlike(edges, settings.camera)
     may_be_sharpened = settings.camera.sharpening.origin is Origin.ASSUMED
     beside = settings.camera.beside
     if not _is_told_beside(settings.camera):
@@ -276,9 +289,26 @@ def _edges_and_gap(
     outcome = measure_gap(fingers, edges, settings.below_tip_px, top, light_gap, coded.coding)
     if isinstance(outcome, GapMeasurement):
         outcome = coded.less_sure(outcome, upright, edges, fingers.orientation, light, top)
-    if (apart_px or edges.beside) and isinstance(outcome, GapMeasurement):
-        outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside)
+    if (apart_px or edges.beside or is_unlike) and isinstance(outcome, GapMeasurement):
+        outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside, is_unlike=is_unlike)
     return edges, outcome
+
+
+def _is_unlike(edges: EdgePoints, camera: CameraModel) -> bool:
+    """Whether the edges show other things beside them than the frames from which the camera was learnt."""
+    if camera.usual is None:
+        return False
+    return any(
+        abs(shown - usual) > max(UNLIKE_SIGMAS * scatter, least * usual)
+        for shown, (usual, scatter), least in zip(
+            (edges.unexplained, edges.widened), camera.usual, LEAST_UNLIKE, strict=True
+        )
+    )
+
+
+def contradicts(outcome: GapMeasurement | NoGap) -> bool:
+    """Whether a frame shows other things beside its edges than its recording has shown before."""
+    return outcome.is_unlike if isinstance(outcome, GapMeasurement) else outcome == THIRD_TONE
 
 
 def _is_told_beside(camera: CameraModel) -> bool:

@@ -11,6 +11,9 @@ from fingervision.vision.grey import to_grey, top_level
 from fingervision.vision.learnt_scene import learnt_beside
 from fingervision.vision.pipeline import Settings, measure_frame, steps_alone
 
+# Fewest pictures of a codec that predicts them from each other.
+FEWEST_PREDICTED = 3
+
 
 def measure_picture(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
     """Measure one picture by itself, with what it shows beside the edges; see `pipeline.measure_frame`."""
@@ -21,7 +24,7 @@ def measure_picture(frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
 def beside_in(frames: Sequence[Frame], settings: Settings) -> BesideEdges | None:
     """Walls, bright lines and shadows beside the edges; None if none are told.
 
-    A codec that predicts pictures from others displaces the edges of one picture in ways that look like them.
+    A codec that predicts pictures from others displaces the edges of few pictures in ways that look like them.
 
     Parameters
     ----------
@@ -33,7 +36,7 @@ def beside_in(frames: Sequence[Frame], settings: Settings) -> BesideEdges | None
     with one_thread():
         looks = [(frame, look) for frame in frames if (look := steps_alone(frame, settings)) is not None]
         are_dark = {is_dark for _, (_, is_dark) in looks}
-        if len(are_dark) != 1 or looks[0][0].coding is Coding.INTERFRAME:
+        if len(are_dark) != 1 or (looks[0][0].coding is Coding.INTERFRAME and len(looks) < FEWEST_PREDICTED):
             return None
         top = max(top_level(to_grey(frame.pixels), settings.bits) for frame, _ in looks)
         seen, coding = [seen for _, (seen, _) in looks], looks[0][0].coding
