@@ -193,7 +193,7 @@ def test_a_stop_keeps_what_was_measured(tmp_path: Path, monkeypatch: pytest.Monk
             signal.raise_signal(signal.SIGINT)
         return outcome
 
-    monkeypatch.setattr("fingervision.measuring.frame_loop.measure_frame", pressed_after_six)
+    monkeypatch.setattr("fingervision.measuring.changed_edges.measure_frame", pressed_after_six)
     measured = measure(rendered(opening(9)), Task(BareScale(PX_PER_MM)), tmp_path)
     assert measured.stopped
     assert measured.exit_code is ExitCode.COULD_NOT
