@@ -15,6 +15,7 @@ from fingervision.domain.own_process import in_own_process
 from fingervision.measuring.scale import Scale
 from fingervision.measuring.temporal_filter import temporal_lag
 from fingervision.vision.defect_pixels import defect_pixels
+from fingervision.vision.flank_profiles import Seen
 from fingervision.vision.grey import to_grey, top_level
 from fingervision.vision.learnt_camera import learnt_camera
 from fingervision.vision.learnt_scene import learnt_beside, less_sure
@@ -105,23 +106,26 @@ def _camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None)
     if len(looks) < FEWEST:  # too few phases and too much noise for a tone curve
         return replace(before, beside=beside_in(frames, settings))
     camera = learnt_camera(seen, before, top, coding, are_dark=are_dark)
-    shown = np.array([(edges.unexplained, edges.widened) for _, edges in seen])
-    usual, scatter = np.median(shown, axis=0), np.std(shown, axis=0)
-    camera = replace(camera, usual=((float(usual[0]), float(scatter[0])), (float(usual[1]), float(scatter[1]))))
     if coding is not Coding.INTERFRAME:  # such a codec repeats the noise of the picture before
         lag = temporal_lag([(frame.index, *each) for frame, (each, _) in looks])
         camera = replace(camera, lag=lag)
     if _has_edge_bias(scale):
         camera = replace(camera, response=before.response, beside=None)
     is_other = before.response.is_known or camera.response.curve is not before.response.curve
-    if polarities == {False} or (are_dark and is_other):
+    if is_other:
         # The steps of light lie elsewhere under another response.
         again = replace(settings, camera=camera)
         seen = [look[0] for frame, _ in looks if (look := steps_alone(frame, again)) is not None]
+    if polarities == {False} or (are_dark and is_other):
         beside = learnt_beside(seen, camera.response, top, coding, are_dark=are_dark)
         rivals_px = camera.beside.u_gap_px if camera.beside is not None and not camera.beside.name else 0.0
         camera = replace(camera, beside=less_sure(beside, rivals_px))
-    return camera
+    return replace(camera, usual=_usual(seen)) if seen else camera
+
+
+def _usual(seen: Sequence[Seen]) -> tuple[tuple[float, float], ...]:
+    shown = np.array([(edges.unexplained, edges.widened) for _, edges in seen])
+    return tuple(zip(np.median(shown, axis=0).tolist(), np.std(shown, axis=0).tolist(), strict=True))
 
 
 def _with_defects(camera: CameraModel, frames: Sequence[Frame], bits: int | None) -> CameraModel:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from fingervision.domain.camera import BesideEdges
 from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.vision.learnt_scene import less_sure
 from fingervision.vision.pipeline import Settings, contradicts, measure_frame
 from fingervision.vision.single_picture import FEWEST_PREDICTED, beside_in
 
@@ -36,7 +37,10 @@ class ChangingEdges:
         self._frames = [*self._frames[1 - FEWEST_PREDICTED :], replace(frame, pixels=frame.pixels.copy())]
         if self._count in LEARNT_FROM:
             bare = replace(settings, camera=replace(settings.camera, beside=None))
-            self._beside = beside_in(self._frames, bare)
+            known = settings.camera.beside
+            # Another tone curve that explained the first frames as well remains a rival.
+            rivals_px = known.u_gap_px if known is not None and not known.name else 0.0
+            self._beside = less_sure(beside_in(self._frames, bare), rivals_px)
         self._count += 1
         if frame.coding is Coding.INTERFRAME and self._count < FEWEST_PREDICTED:
             return outcome
