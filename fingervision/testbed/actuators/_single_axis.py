@@ -33,14 +33,16 @@ PATIENCE, PATIENCE_S, HOME_S = 1.5, 2.0, 120.0
 LOST_MM = 0.02
 HOMING_MM_S = 1.0
 LOOK_EVERY_S = 0.01
-# A stage stands still if for STILL_S it was slower than a tenth of its speed: less is the noise of its encoder. The
-# search of a reference ends in a slow approach, whose speed is the device's own: it stands still below 7 um/s.
-STILL_S, STILL_SHARE, STILL_MM = 0.15, 0.1, 0.001
-# No stage of the right units is twice as fast as it was told; the wrong ones differ by 10, 25.4, 60 or 1000.
-TOO_FAST = 2.0
 # A controller states a position that is refreshed at intervals, and may be ahead of the stage or behind it by one of
 # them: at most 0.2 s, twice the interval of the usual scan of an EPICS server.
 REFRESHED_S = 0.2
+# A stage stands still if for STILL_S it was slower than a tenth of its speed: less is the noise of its encoder. In that
+# time its position was refreshed, and a stage at speed went on by more than this tenth before. The search of a
+# reference ends in a slow approach, whose speed is the device's own: it stands still below 5 um/s.
+STILL_SHARE, STILL_MM = 0.1, 0.001
+STILL_S = REFRESHED_S / (1.0 - STILL_SHARE)
+# No stage of the right units is twice as fast as it was told; the wrong ones differ by 10, 25.4, 60 or 1000.
+TOO_FAST = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,18 +188,25 @@ class SingleAxis(FreeMoves, ABC):
     def _has_ended(self, motion: _Motion) -> bool:
         """Whether a stage that reports no motion has ended its motion, rather than not begun it or reported it wrongly.
 
-        It has if it has reported motion before and is at its target, or if it stands still.
+        At its target, it has if it has reported motion before or stands still. Elsewhere, it may as well creep along a
+        ramp, and must stand still for as long as a ramp may last.
         """
-        if self._stands_still():
-            return True
-        return self._seen and motion.to_mm is not None and abs(self._now_mm - motion.to_mm) <= self._near_mm + LOST_MM
+        held_s = self._held_s()
+        if motion.to_mm is None:
+            return held_s >= self._still_s
+        if abs(self._now_mm - motion.to_mm) <= self._near_mm + LOST_MM:
+            return self._seen or held_s >= self._still_s
+        return held_s >= self._still_s + self.limits.settling_s
 
     def _stands_still(self) -> bool:
-        """Query the position, and state whether it is held for some time."""
-        # The time before the question: on a busy computer, the answer may be old when it is looked at.
+        return self._held_s() >= self._still_s
+
+    def _held_s(self) -> float:
+        """Query the position, and state for how long it has been held."""
+        # Until the question: on a busy computer, the answer may be old when it is looked at.
         asked_s = self._clock.now_s()
         self._at_mm()
-        return asked_s - self._since_s >= self._still_s
+        return asked_s - self._since_s
 
     def _continues_home(self) -> bool:
         """Move from the reference to position 0, if they are not the same; return whether the stage moves on."""
@@ -233,30 +242,35 @@ class SingleAxis(FreeMoves, ABC):
 
     def home(self) -> None:
         """Go to the reference, then to position 0."""
-        self._ready()
-        stops, self._fault = self._stops, None
-        self._do(self._go_home)
-        began_s, self._still_mm, self._still_s = self._clock.now_s(), STILL_MM, STILL_S
-        self._went(stops, _Motion(None, began_s, began_s + HOME_S))
+        with self._line:
+            self._ready()
+            stops, self._fault = self._stops, None
+            self._do(self._go_home)
+            began_s, self._still_mm, self._still_s = self._clock.now_s(), STILL_MM, STILL_S
+            self._went(stops, _Motion(None, began_s, began_s + HOME_S))
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move to a position at a positive speed."""
         check_move(self.limits, to_mm, speed_mm_s)
-        self._ready()
-        if self._fault is not None:
-            raise DeviceError(f"{self.name} must know its position, but {self._fault.words}. Nothing was moved.")
-        at_mm, low_mm, high_mm = self._at_mm(), self.limits.lower_mm, self.limits.upper_mm
-        if not (
-            self._homed and low_mm - LOST_MM <= at_mm + self._near_mm and at_mm - self._near_mm <= high_mm + LOST_MM
-        ):
-            has = (
-                f"stands at {at_mm:g} mm" if self._homed else "has not searched its reference since it was switched on"
-            )
-            raise DeviceError(
-                f"{self.name} must stand within its range of {low_mm:g} to {high_mm:g} mm before it moves, but {has}: "
-                "home it, and check zero_mm and the units. Nothing was moved."
-            )
-        self._start(at_mm, to_mm, speed_mm_s)
+        # Nobody looks between the begin of the way and the command: what was gone then would be of no motion.
+        with self._line:
+            self._ready()
+            if self._fault is not None:
+                raise DeviceError(f"{self.name} must know its position, but {self._fault.words}. Nothing was moved.")
+            at_mm, low_mm, high_mm = self._at_mm(), self.limits.lower_mm, self.limits.upper_mm
+            if not (
+                self._homed and low_mm - LOST_MM <= at_mm + self._near_mm and at_mm - self._near_mm <= high_mm + LOST_MM
+            ):
+                has = (
+                    f"stands at {at_mm:g} mm"
+                    if self._homed
+                    else "has not searched its reference since it was switched on"
+                )
+                raise DeviceError(
+                    f"{self.name} must stand within its range of {low_mm:g} to {high_mm:g} mm before it moves, but "
+                    f"{has}: home it, and check zero_mm and the units. Nothing was moved."
+                )
+            self._start(at_mm, to_mm, speed_mm_s)
 
     def jog(self, speed_mm_s: float) -> None:
         """Begin to move until stopped or until a limit is reached."""
@@ -312,7 +326,8 @@ class SingleAxis(FreeMoves, ABC):
 
     def _went(self, stops: int, motion: _Motion) -> None:
         """Note a motion that was begun; a stop that came while it was begun is repeated, because it came too early."""
-        self._motion, self._seen, self._since_s, self._jump_mm = motion, False, self._clock.now_s(), 0.0
+        self._motion, self._seen, self._since_s = motion, False, self._clock.now_s()
+        self._held_mm, self._jump_mm = self._now_mm, 0.0
         if self._stops != stops:
             self.stop()
 
