@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, DeviceError, LimitError, StateError
 from fingervision.domain.frame import Frame
 from fingervision.measuring.camera_learning import WANTED, camera_beside
+from fingervision.measuring.changed_edges import ChangingEdges
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.clocks.clock import VirtualClock
 from fingervision.testbed.force_sensor import Reading
@@ -251,6 +252,7 @@ class GapDevice:
         self.name, self._lock, self._unix_s = name, lock, unix_s
         self._clock = bed.clock
         self._sight = Sight(replace(bed, actuator=actuator.consumer()))
+        self._edges = ChangingEdges()
         self._source = self._sight.camera.description.name
         self._newest: dict[str, Any] | None = None
         self._at_s = 0.0
@@ -382,7 +384,7 @@ class GapDevice:
                 placed.clear()
 
     def _measured(self, look: Look, input_mm: float | None) -> dict[str, Any]:
-        row, _ = self._sight.measure(look.shot.item())
+        row, _ = self._sight.measure(look.shot.item(), self._edges.measure)
         values = {
             "gap_mm": row.gap_mm,
             "u_gap_mm": row.u_gap_mm,

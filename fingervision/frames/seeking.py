@@ -1,11 +1,13 @@
 """Random access to a frame by its time, for display only; a series is never measured by random access."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Protocol
 
 import av
 
 from fingervision.domain.frame import Coding, Frame
+from fingervision.domain.quantiser import Quantiser
 from fingervision.frames import image_folder, video_file
 from fingervision.frames.decoded_picture import EXPORTED, StepTrail, luma
 from fingervision.frames.file_pictures import picture_times_s
@@ -15,6 +17,8 @@ from fingervision.frames.video_file import upright, upright_steps
 # Largest number of frames that are decoded from a key frame to the wanted frame; beyond it, frames are counted from the
 # recording's start.
 MOST_FRAMES_TO_DECODE = 600
+# A frame at most this much later than the one before is reached by reading on.
+READ_ON_S = 1
 
 
 class Seeking(Protocol):
@@ -65,35 +69,57 @@ class VideoSeeking:
         self._name = name
         self._coding = video_file.VideoFile(name).description.coding
         self._container: av.container.InputContainer | None = None
-        self._tick: int | None = None
+        self._pictures: Iterator[tuple[av.VideoFrame, Quantiser | None]] | None = None
+        self._wanted = 0
 
     def frame(self, index: int, time_s: float) -> Frame | None:
         """Return the frame with exactly the given time; None if it does not exist or cannot be decoded alone."""
         try:
-            return self._found(index, time_s)
+            found = self._found(index, time_s)
         except (av.FFmpegError, OSError, ValueError):
+            found = None
+        if found is None:
             self._close()
-            return None
+        return found
 
     def _found(self, index: int, time_s: float) -> Frame | None:
         if self._container is None:
-            self._container = open_container(self._name)
-            self._container.streams.video[0].codec_context.options = EXPORTED
+            self._container, self._pictures = open_container(self._name), None
+            codec = self._container.streams.video[0].codec_context
+            # Without threads a picture is decoded from its own packet, which may be the last in a file that is written.
+            codec.options, codec.thread_count = EXPORTED, 1
         stream = self._container.streams.video[0]
         if stream.time_base is None:
             return None
-        wanted = round(time_s / float(stream.time_base))
-        self._container.seek(wanted, stream=stream, backward=True)
-        trail = StepTrail()
-        for number, picture in enumerate(self._container.decode(stream)):
-            steps = trail.of(picture)
-            if picture.pts == wanted and not picture.is_corrupt:
+        before, self._wanted = self._wanted, round(time_s / float(stream.time_base))
+        if self._pictures is None or not 0 < self._wanted - before < READ_ON_S / stream.time_base:
+            self._container.seek(self._wanted, stream=stream, backward=True)
+            self._pictures = self._decoded(self._container, stream)
+        for number, (picture, steps) in enumerate(self._pictures):
+            if picture.pts == self._wanted and not picture.is_corrupt:
                 hangs = self._coding is Coding.INTERFRAME and not picture.key_frame
                 pixels = upright(luma(picture), picture.rotation)
                 return Frame(pixels, index, time_s, self._coding, hangs, upright_steps(steps, picture))
-            if number > MOST_FRAMES_TO_DECODE or picture.pts is None or picture.pts > wanted:
+            if number > MOST_FRAMES_TO_DECODE or picture.pts is None or picture.pts > self._wanted:
                 return None
         return None
+
+    def _decoded(
+        self, container: av.container.InputContainer, stream: av.VideoStream
+    ) -> Iterator[tuple[av.VideoFrame, Quantiser | None]]:
+        """Decode on, from the last key frame before the wanted one."""
+        trail = StepTrail()
+        group: list[av.packet.Packet[av.VideoStream]] = []
+        for packet in container.demux(stream):
+            if packet.is_keyframe:
+                group.clear()
+            group.append(packet)
+            if packet.pts is not None and packet.pts < self._wanted:
+                continue
+            for each in group:
+                for picture in each.decode():
+                    yield picture, trail.of(picture)
+            group.clear()
 
     def _close(self) -> None:
         if self._container is not None:

@@ -3,8 +3,9 @@
 from collections import deque
 from itertools import pairwise
 from math import fsum, sqrt
-from statistics import median
 from threading import RLock
+
+import numpy as np
 
 # Number of the most recent frames from which rate and jitter are computed.
 FRAMES_LOOKED_AT = 100
@@ -35,6 +36,7 @@ class Cadence:
         self._long_s: deque[float] = deque(maxlen=FRAMES_FOR_THE_PERIOD)
         self._lateness_s: deque[float] = deque(maxlen=FRAMES_UNTIL_SURE)
         self._due_s: float | None = None
+        self._period_s: float | None = None
 
     def restart(self) -> None:
         """Discard the times before an interruption, which is not counted as missing frames."""
@@ -42,7 +44,7 @@ class Cadence:
             self._times_s.clear()
             self._long_s.clear()
             self._lateness_s.clear()
-            self._due_s = None
+            self._due_s = self._period_s = None
 
     def add(self, time_s: float) -> None:
         """Add the time of a frame to the statistics."""
@@ -52,9 +54,10 @@ class Cadence:
     def _add(self, time_s: float) -> None:
         self._times_s.append(time_s)
         self._long_s.append(time_s)
+        self._period_s = self._median_s()
         if len(self._times_s) < FRAMES_TO_KNOW_THE_PERIOD:
             return
-        period_s = self.period_s
+        period_s = self._period_s
         if period_s is None:
             return
         self._due_s = time_s if self._due_s is None else self._due_s + period_s
@@ -81,12 +84,14 @@ class Cadence:
     @property
     def period_s(self) -> float | None:
         """Median time between frames (s); None until it is known."""
-        with self._lock:
-            times = tuple(self._long_s)
-        stride = min(FRAMES_A_STRIDE, len(times) // 2)
+        return self._period_s
+
+    def _median_s(self) -> float | None:
+        times_s = np.array(self._long_s)
+        stride = min(FRAMES_A_STRIDE, times_s.size // 2)
         if stride < 1:
             return None
-        usual_s = median(after - before for before, after in zip(times, times[stride:], strict=False)) / stride
+        usual_s = float(np.median(times_s[stride:] - times_s[:-stride])) / stride
         return usual_s if usual_s > 0.0 else None
 
     @property

@@ -18,7 +18,7 @@ from fingervision.measuring.sound_picture import SoundPictures
 from fingervision.measuring.task import Task
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.defect_pixels import repaired
-from fingervision.vision.pipeline import Settings, measure_frame
+from fingervision.vision.pipeline import Settings
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -26,7 +26,7 @@ T = TypeVar("T")
 # The camera of a live view, learnt while frames arrive: assumed at first, known after a dozen frames with a gap. Frames
 # that were measured before are measured again by the camera that was learnt, so that all rows have the same; they
 # are kept until then, up to this number of pixels.
-MOST_KEPT_PX = 150_000_000
+MOST_KEPT_PX = 60_000_000
 
 
 class LiveCamera:
@@ -203,8 +203,9 @@ class FrameMeasurement:
         return outcome
 
     def _measure_again(self, frames: Sequence[Frame], settings: Settings, task: Task) -> None:
+        edges = ChangingEdges()
         found = [
-            Result(frame.index, frame.time_s, measure_frame(repaired(frame, settings.camera), settings))
+            Result(frame.index, frame.time_s, edges.measure(repaired(frame, settings.camera), settings))
             for frame in frames
         ]
         self._take_again(RowMaker(task.scale, self._frame_size_px).rows(found))

@@ -21,8 +21,8 @@ from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.overlay import in_eight_bits
 
 JPEG_QUALITY = 85
-# Time for which a composed state is used again: all pages that show the same picture ask within this time.
-STATE_FOR_S = 0.02
+# Time for which a composed state is used again; rows, messages and the picture's values are always the newest.
+STATE_FOR_S = 0.2
 # Largest number of rows in one message.
 ROWS_AT_ONCE = 3000
 # Number of rows that can be converted to text within a millisecond.
@@ -166,8 +166,8 @@ def _picture(seen: Seen) -> bytes:
     """The picture as JPEG; the page itself draws the measured points and shows frame number and value as text."""
     levels = in_eight_bits(seen.frame.pixels)
     if levels.ndim == 2:
-        return bytes(simplejpeg.encode_jpeg(levels[:, :, np.newaxis], JPEG_QUALITY, "GRAY"))
-    return bytes(simplejpeg.encode_jpeg(np.asarray(levels, np.uint8), JPEG_QUALITY, "RGB", "420"))
+        return bytes(simplejpeg.encode_jpeg(levels[:, :, np.newaxis], JPEG_QUALITY, "GRAY", fastdct=True))
+    return bytes(simplejpeg.encode_jpeg(np.asarray(levels, np.uint8), JPEG_QUALITY, "RGB", "420", fastdct=True))
 
 
 def draw_beforehand(view: View) -> None:

@@ -16,7 +16,7 @@ light, leave these places where they are.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import floor, hypot
 from typing import Any
 
@@ -100,8 +100,10 @@ class _Seen:
         """Largest share of the picture's width over which the grey level changes from a row to the next."""
         grey = to_grey(self.frame.pixels)
         least = LEAST_STEP * min(abs(one.contrast) for one in self.fingers)
-        is_step = np.asarray(cv2.absdiff(grey[1:], grey[:-1])) > least
-        return float(np.max(np.mean(is_step, axis=1)))
+        is_step = cv2.threshold(cv2.absdiff(grey[1:], grey[:-1]), least, 1.0, cv2.THRESH_BINARY)[1]
+        kind = cv2.CV_32S if grey.dtype == np.uint8 else cv2.CV_64F
+        steps: NDArray[Any] = cv2.reduce(is_step, 1, cv2.REDUCE_SUM, dtype=kind)
+        return float(steps.max() / grey.shape[1])
 
     @cached_property
     def positions(self) -> tuple[tuple[float, float], ...]:
@@ -204,7 +206,7 @@ def _agree(one: _Look, other: _Look, tolerance_px: float) -> bool:
         return True
     change = sides_px[1] - sides_px[0]
     heights_px = BAND_PX * np.arange(count)
-    lower, upper = np.triu_indices(count, 1)
+    lower, upper = _pairs(count)
     turns = ((change[:, upper] - change[:, lower]) / (heights_px[upper] - heights_px[lower])).ravel()
     turns = turns[np.isfinite(turns)]
     turn = float(np.median(turns)) if turns.size else 0.0
@@ -220,6 +222,12 @@ def _agree(one: _Look, other: _Look, tolerance_px: float) -> bool:
         or np.count_nonzero(differs) > MOST_DIFFERENT * np.count_nonzero(is_seen)
         or np.count_nonzero(is_covered) > MOST_DIFFERENT * beyond
     )
+
+
+@cache
+def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    lower, upper = np.triu_indices(count, 1)
+    return lower, upper
 
 
 def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:

@@ -38,19 +38,23 @@ def edge_shift_px(
     blur_px : float
         Gaussian sigma of the edge (pixels).
     """
+    return _shifts(assumed, (other,), *_rounded(inside, outside, blur_px))[0]
+
+
+def _rounded(inside: float, outside: float, blur_px: float) -> tuple[int, int, int]:
     levels = [round(min(max(share, 0.0), 1.0) / LEVEL_STEP) for share in (inside, outside)]
-    blur = round(log(max(blur_px, 0.2)) / log(BLUR_RATIO))
-    return 0.0 if levels[0] == levels[1] else _shift(assumed, other, *levels, blur)
+    return levels[0], levels[1], round(log(max(blur_px, 0.2)) / log(BLUR_RATIO))
 
 
 def u_edge_px(response: ResponseEstimate, inside: float, outside: float, blur_px: float) -> float:
     """Standard uncertainty of an edge's position due to the camera's response (pixels); see `edge_shift_px`."""
-    return sqrt(
-        sum(
-            each.weight * edge_shift_px(response.curve, each.response, inside, outside, blur_px) ** 2
-            for each in response.others
-        )
-    )
+    shifts_px = _shifts_of(response, inside, outside, blur_px)
+    return sqrt(sum(each.weight * px**2 for each, px in zip(response.others, shifts_px, strict=True)))
+
+
+def _shifts_of(response: ResponseEstimate, inside: float, outside: float, blur_px: float) -> tuple[float, ...]:
+    others = tuple(each.response for each in response.others)
+    return _shifts(response.curve, others, *_rounded(inside, outside, blur_px))
 
 
 def u_gap_response_px(measured: GapMeasurement, edges: EdgePoints, response: ResponseEstimate, top_level: int) -> float:
@@ -64,12 +68,22 @@ def u_gap_response_px(measured: GapMeasurement, edges: EdgePoints, response: Res
         ((measured.left, measured.left.slope), (measured.right, -measured.right.slope))
     ):
         inside, outside = (level / top_level for level in (edges.inside[k], edges.inside[k] + finger.contrast))
-        sides.append((inside, outside, float(edges.blur_px[k, 0]), hypot(1.0, slope) - slope))
+        shifts_px = _shifts_of(response, inside, outside, float(edges.blur_px[k, 0]))
+        sides.append([(hypot(1.0, slope) - slope) * px for px in shifts_px])
     variance, mean = 0.0, 0.0
-    for other in response.others:
-        shift = -sum(share * edge_shift_px(response.curve, other.response, *side) for *side, share in sides)
+    for other, left_px, right_px in zip(response.others, *sides, strict=True):
+        shift = -(left_px + right_px)
         variance, mean = variance + other.weight * shift**2, mean + other.weight * shift
     return copysign(sqrt(variance), mean)
+
+
+@lru_cache(maxsize=1024)
+def _shifts(
+    assumed: CameraResponse, others: tuple[CameraResponse, ...], inside: int, outside: int, blur: int
+) -> tuple[float, ...]:
+    if inside == outside:
+        return (0.0,) * len(others)
+    return tuple(_shift(assumed, other, inside, outside, blur) for other in others)
 
 
 @lru_cache(maxsize=8192)

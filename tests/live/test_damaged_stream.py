@@ -15,6 +15,7 @@ from fingervision.frames.source import open_source
 from fingervision.live.capture import Arrival, Capture, Ended
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.live.supervisor import Supervisor
+from fingervision.measuring import run_table
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
@@ -64,10 +65,17 @@ def recorded(stream: Path, out: Path, task: Task) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("coder", ["h264", "mjpeg"])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("seed", "memory"), [(1, None), (2, None), (3, 0), (4, 0)])
 def test_the_recording_of_a_lossy_stream_measures_to_the_live_table(
-    tmp_path: Path, film: list[np.ndarray], coder: str, seed: int
+    tmp_path: Path,
+    film: list[np.ndarray],
+    coder: str,
+    seed: int,
+    memory: int | None,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    if memory is not None:  # pictures are read again from the video
+        monkeypatch.setattr(run_table, "MEMORY_WAITING", memory)
     stream = tmp_path / ("clip.ts" if coder == "h264" else "clip.mkv")
     begins = coded(stream, film, coder)
     content = bytearray(stream.read_bytes())

@@ -1,20 +1,24 @@
 """The table of a run is that of its video: one camera, learnt from the run's own first frames."""
 
+import weakref
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
 
 import numpy as np
+import pytest
 
 from calib.calibration import BareScale
 from fingervision.domain.camera import Origin
 from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement
+from fingervision.frames.ahead import FRAMES_AHEAD
 from fingervision.frames.source import Description, open_source
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import FrameMeasurement
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.live.session import History
+from fingervision.measuring import run_table
 from fingervision.measuring.camera_learning import WANTED
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
@@ -81,6 +85,28 @@ def test_rows_before_the_camera_is_known_are_measured_again_by_it() -> None:
         assert isinstance(found, GapMeasurement)
         assert row.gap_px == found.gap_px
         assert row.input_mm == 0.25
+
+
+def test_pictures_do_not_wait_in_memory_while_the_camera_is_learnt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_table, "MEMORY_WAITING", 0)  # the fewest: 16
+    task, pictures = Task(BareScale(SCALE)), list[weakref.ref[np.ndarray]]()
+    run = RunFolder(tmp_path / "runs", DESCRIPTION, task, None)
+    for k in range(2 * COUNT):
+        frame = frame_of(k % COUNT)
+        frame = replace(frame, index=k, time_s=k / 25.0)
+        pictures.append(weakref.ref(frame.pixels))
+        run.add(RecordedFrame(frame, ()))
+        del frame
+    assert run.camera is None  # a process of its own needs longer to begin
+    # What waits, and the decoder's eight frames ahead; the learning keeps copies.
+    assert sum(picture() is not None for picture in pictures) <= run_table.FRAMES_WAITING + FRAMES_AHEAD + 2
+    run.close("The test ended.")
+    measure(open_source(str(run.path / "video.mp4")), task, tmp_path / "again")
+    live, again = ((path / "gaps.csv").read_text() for path in (run.path, tmp_path / "again"))
+    assert live.count(",ok,") >= COUNT
+    assert again == live
 
 
 def test_a_run_whose_camera_becomes_known_on_the_way_has_the_table_of_its_video(tmp_path: Path) -> None:

@@ -234,7 +234,8 @@ class BedRunFolder:
                 write_expected(path / SIMULATION, bed.model, bed.limits)
             self._samples = SamplesCsv(path / SAMPLES, tuple(bed.channels), go_on=bool(self.rows))
             description = replace(sight.camera.description, files=(path / VIDEO,))
-            self.table = RunTable(description, sight.task, self._take, None if bed.replays else camera_beside)
+            learn = None if bed.replays else camera_beside
+            self.table = RunTable(description, sight.task, self._take, learn, waits=bed.replays)
             if self.rows:
                 # The camera is learnt from the first frames, and each frame is judged by those before it.
                 for item in islice(VideoFile(str(path / VIDEO)), len(self.rows)):
@@ -283,9 +284,16 @@ class BedRunFolder:
         if number >= len(self.events_done):
             self._files.event({"n": number, "time_s": round(self.last_s, 6), "event": name, "words": words, **more})
 
+    def end_pictures(self) -> None:
+        """Complete the video, and measure the frames that wait."""
+        try:
+            self._video.close()
+        finally:
+            self.table.close()
+
     def finish(self, found: Mapping[str, Any]) -> None:
         """Close the folder of a completed run."""
-        self._end()
+        self._samples.close()
         if self.before:
             write_rows(self.path / JOINED, [*self.before, *read_samples(self.path / SAMPLES)])
         self._about |= {**found, "joined": JOINED if self.before else None}
@@ -299,18 +307,14 @@ class BedRunFolder:
     def break_off(self, why: str) -> None:
         """Close the folder of an interrupted run; its content remains valid, and the run may be continued."""
         with suppress(FingervisionError):
-            self.table.close()
+            self.end_pictures()
         with suppress(FingervisionError):
             self._files.event({"time_s": round(self.last_s, 6), "event": "stopped", "words": why})
         with suppress(FingervisionError):
-            self._end()
+            self._samples.close()
         with suppress(FingervisionError):
             self._files.close()
         self._lock.release()
-
-    def _end(self) -> None:
-        self._video.close()
-        self._samples.close()
 
 
 def rows_before(path: Path) -> list[SampleRow]:

@@ -182,7 +182,7 @@ class RunRecord:
         `with_last` includes the last frames, which are then judged without those that would have followed.
         """
         self.write()
-        self.folder.table.close()
+        self.folder.end_pictures()
         if with_last:
             self.write()
 

@@ -10,6 +10,7 @@ from fingervision.domain.camera import CameraModel
 from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.measuring.frame_loop import MeasureFrame
 from fingervision.measuring.rows import Result, RowMaker
 from fingervision.measuring.task import Task, task_for_frames
 from fingervision.motion.encoder_interpolation import StageTrack
@@ -225,8 +226,13 @@ class Sight:
         if camera is not None:
             self.settings = replace(self.settings, camera=camera)
 
-    def measure(self, item: Frame | LostFrame) -> tuple[GapRow, GapMeasurement | NoGap | LostFrame]:
-        """Measure a picture: return its row, and the result from which the row was made."""
-        outcome = item if isinstance(item, LostFrame) else measure_frame(item, self.settings)
+    def measure(
+        self, item: Frame | LostFrame, how: MeasureFrame = measure_frame
+    ) -> tuple[GapRow, GapMeasurement | NoGap | LostFrame]:
+        """Measure a picture at once: return its row, and the result from which the row was made.
+
+        A stage in motion cannot wait until something else beside the edges is learnt; others give `ChangingEdges`.
+        """
+        outcome = item if isinstance(item, LostFrame) else how(item, self.settings)
         (row,) = self._rows.rows((Result(item.index, item.time_s, outcome),))
         return row, outcome
