@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 # The camera of a live view, learnt while frames arrive: assumed at first, known after a dozen frames with a gap. Frames
 # that were measured before are measured again by the camera that was learnt, so that all rows have the same; they
-# are kept until then, up to this number of pixels.
+# are kept until then, up to this number of pixels. By how much their gaps change is in the uncertainty of the others.
 MOST_KEPT_PX = 60_000_000
 
 
@@ -37,13 +37,17 @@ class LiveCamera:
     tell : callable
         Called with a sentence once the camera is known, or is known not to be learnable.
     again : callable
-        Called in a thread of its own, once the camera is known, with the frames before and how to measure them.
+        Called in a thread of its own, once the camera is known, with the frames before, how to measure them, and the
+        numbers of those behind them that were not kept.
     """
 
-    def __init__(self, tell: Callable[[str], None], again: Callable[[Sequence[Frame], Settings, Task], None]) -> None:
+    def __init__(
+        self, tell: Callable[[str], None], again: Callable[[Sequence[Frame], Settings, Task, range], None]
+    ) -> None:
         self._tell, self._told, self._again = tell, "", again
         self._key: tuple[object, object] = (None, None)
         self._frames: list[Frame] = []
+        self._left_out = range(0)
         self._learning: Future[CameraModel] | None = None
         self._measuring: Future[None] | None = None
         self._camera: CameraModel | None = None
@@ -67,7 +71,7 @@ class LiveCamera:
         self._know(camera)
         settings, frames, self._frames = replace(settings, camera=camera), self._frames, []
         if frames:
-            self._measuring = _in_a_thread(self._again, frames, settings, task)
+            self._measuring = _in_a_thread(self._again, frames, settings, task, self._left_out)
         return settings
 
     def add(self, frame: Frame, settings: Settings, task: Task, *, learns: bool) -> None:
@@ -76,6 +80,9 @@ class LiveCamera:
             return
         if (len(self._frames) + 1) * frame.pixels.size < MOST_KEPT_PX or len(self._frames) < WANTED:
             self._frames.append(replace(frame, pixels=frame.pixels.copy()))
+            self._left_out = range(frame.index + 1, frame.index + 1)
+        else:
+            self._left_out = range(self._left_out.start, frame.index + 1)
         if learns and self._learning is None and len(self._frames) >= WANTED:
             self._learning = _in_a_thread(camera_beside, self._frames[-WANTED:], settings, task.scale)
 
@@ -138,7 +145,8 @@ class FrameMeasurement:
     tell : callable
         Called with a sentence once the camera has been learnt.
     again : callable
-        Called in a thread of its own, once the camera has been learnt, with new rows of the frames with a gap before.
+        Called in a thread of its own, once the camera has been learnt, with new rows of the frames with a gap before,
+        and the numbers of those that were not kept.
     """
 
     def __init__(
@@ -147,7 +155,7 @@ class FrameMeasurement:
         files: tuple[Path, ...] = (),
         fingers_are_dark: bool | None = None,
         tell: Callable[[str], None] = lambda words: None,
-        again: Callable[[Sequence[GapRow]], None] = lambda rows: None,
+        again: Callable[[Sequence[GapRow], range], None] = lambda rows, left_out: None,
     ) -> None:
         self._frame_size_px, self._files, self._fingers_are_dark = frame_size_px, files, fingers_are_dark
         self._pictures, self._camera = SoundPictures(), LiveCamera(tell, self._measure_again)
@@ -202,10 +210,10 @@ class FrameMeasurement:
             self._camera.add(frame, settings, choices.task, learns=run is None)
         return outcome
 
-    def _measure_again(self, frames: Sequence[Frame], settings: Settings, task: Task) -> None:
+    def _measure_again(self, frames: Sequence[Frame], settings: Settings, task: Task, left_out: range) -> None:
         edges = ChangingEdges()
         found = [
             Result(frame.index, frame.time_s, edges.measure(repaired(frame, settings.camera), settings))
             for frame in frames
         ]
-        self._take_again(RowMaker(task.scale, self._frame_size_px).rows(found))
+        self._take_again(RowMaker(task.scale, self._frame_size_px).rows(found), left_out)

@@ -35,8 +35,14 @@ from fingervision.vision.grey import full_scale, to_grey
 # Number of rows: ten minutes at 25 frames per second.
 ROWS_KEPT = 15_000
 STATUSES = tuple(Status)
-# Columns of a row: frame, time_s, status and thirteen numbers; two further columns hold input and force.
-COLUMNS_KEPT = 16
+FINGERS = ("", "dark", "light")
+# All columns but the name of the run; status and fingers are numbers of a list.
+NAMES = tuple(each.name for each in fields(GapRow) if each.name != "run")
+STATUS, OF_FINGERS = NAMES.index("status"), NAMES.index("fingers")
+OF_DRIVE = NAMES.index("input_mm")
+GAPS = np.array([NAMES.index(name) for name in ("gap_px", "gap_mm")])
+UNSURE = np.array([NAMES.index(name) for name in ("u_shift_px", "u_gap_mm")])
+_cells_of = attrgetter(*NAMES)  # `dataclasses.astuple` copies every value, which takes half a millisecond
 
 
 class History:
@@ -50,7 +56,7 @@ class History:
 
     def __init__(self, kept: int = ROWS_KEPT) -> None:
         # Filling the array makes the operating system allocate its memory now. NaN represents an empty cell, only here.
-        self._cells = np.full((kept, COLUMNS_KEPT + 2), np.nan)
+        self._cells = np.full((kept, len(NAMES)), np.nan)
         self.count = 0
         self._lock = Lock()
 
@@ -60,11 +66,20 @@ class History:
             self._cells[self.count % len(self._cells)] = _cells(row)
             self.count += 1
 
-    def replace(self, rows: Sequence[GapRow]) -> None:
-        """Replace the rows of some frames; their input and force stay."""
+    def replace(self, rows: Sequence[GapRow], others: range) -> None:
+        """Replace the rows of some frames; their input and force stay.
+
+        The greatest change of a gap is added to the uncertainty of other frames, which cannot be measured again.
+        """
         with self._lock:
+            change = np.zeros(len(GAPS))
             for row in rows:
-                self._cells[self._cells[:, 0] == row.frame, :COLUMNS_KEPT] = _cells(row)[:COLUMNS_KEPT]
+                here, now = self._cells[:, 0] == row.frame, np.array(_cells(row))
+                changed = np.abs(self._cells[here][:, GAPS] - now[GAPS])
+                change = np.fmax(change, np.fmax.reduce(changed, axis=0, initial=0.0))
+                self._cells[here, :OF_DRIVE] = now[:OF_DRIVE]
+            among = (self._cells[:, 0] >= others.start) & (self._cells[:, 0] < others.stop)
+            self._cells[np.ix_(among, UNSURE)] = np.hypot(self._cells[np.ix_(among, UNSURE)], change)
 
     @property
     def oldest(self) -> int:
@@ -77,19 +92,16 @@ class History:
             last = self.count if before is None else min(before, self.count)
             asked = np.arange(max(after, self.count - len(self._cells)), last)
             kept = self._cells[asked % len(self._cells)].tolist()
-        for frame, time_s, status, *numbers in kept:
-            cells: list[Any] = [None if cell != cell else cell for cell in (time_s, *numbers)]
-            row = GapRow(int(frame), cells[0], STATUSES[int(status)], *cells[1:-2])
-            yield row if cells[-2] is None else replace(row, input_mm=cells[-2], force_n=cells[-1])
-
-
-# `dataclasses.astuple` copies every value, which takes half a millisecond.
-_cells_of = attrgetter(*(each.name for each in fields(GapRow)[:COLUMNS_KEPT]), "input_mm", "force_n")
+        for numbers in kept:
+            cells: list[Any] = [None if cell != cell else cell for cell in numbers]
+            cells[0], cells[STATUS] = int(cells[0]), STATUSES[int(cells[STATUS])]
+            cells[OF_FINGERS] = FINGERS[int(cells[OF_FINGERS])]
+            yield GapRow(**dict(zip(NAMES, cells, strict=True)))
 
 
 def _cells(row: GapRow) -> list[float]:
     cells = [*_cells_of(row)]
-    cells[2] = STATUSES.index(row.status)
+    cells[STATUS], cells[OF_FINGERS] = STATUSES.index(row.status), FINGERS.index(row.fingers)
     return [np.nan if cell is None else cell for cell in cells]
 
 
@@ -370,9 +382,9 @@ class Session:
         lags = self.capture.waiting.qsize() > FRAMES_UNTIL_HURRY
         return lags or (recorder is not None and recorder.in_a_hurry)
 
-    def _replace(self, rows: Sequence[GapRow]) -> None:
+    def _replace(self, rows: Sequence[GapRow], left_out: range) -> None:
         """Replace rows that were measured before the camera was known; pages read all rows again."""
-        self.history.replace(rows)
+        self.history.replace(rows, left_out)
         self.identity = secrets.token_hex(4)
 
     def _measure(self) -> None:

@@ -1,6 +1,7 @@
 """The table of a run is that of its video: one camera, learnt from the run's own first frames."""
 
 import weakref
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
@@ -14,6 +15,7 @@ from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.ahead import FRAMES_AHEAD
 from fingervision.frames.source import Description, open_source
+from fingervision.live import frame_measurement
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import FrameMeasurement
 from fingervision.live.run_folder import RecordedFrame, RunFolder
@@ -62,9 +64,19 @@ def test_a_camera_that_is_being_learnt_when_a_run_begins_is_used_until_the_run_h
     assert run.camera is None
 
 
-def test_rows_before_the_camera_is_known_are_measured_again_by_it() -> None:
+@pytest.mark.parametrize("kept_px", [frame_measurement.MOST_KEPT_PX, 0])
+def test_rows_before_the_camera_is_known_are_measured_again_by_it(
+    kept_px: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(frame_measurement, "MOST_KEPT_PX", kept_px)
     again: list[GapRow] = []
-    view, choices, history = FrameMeasurement(SIZE_PX, again=again.extend), Choices(BareScale(SCALE)), History()
+    history = History()
+
+    def take(rows: Sequence[GapRow], left_out: range) -> None:
+        history.replace(rows, left_out)
+        again.extend(rows)
+
+    view, choices = FrameMeasurement(SIZE_PX, again=take), Choices(BareScale(SCALE))
     task = choices.task
     assert task is not None
     frames: dict[int, Frame] = {}
@@ -76,15 +88,19 @@ def test_rows_before_the_camera_is_known_are_measured_again_by_it() -> None:
         assert row is not None
         history.add(replace(row, input_mm=0.25))
         sleep(0.02)
-    history.replace(again)
     assert view.settings is not None
     assert view.settings.camera.response.origin is Origin.LEARNT
     assert len(again) >= WANTED
-    for row in history.rows():
+    rows = list(history.rows())
+    for row in rows:
         found = measure_frame(frames[row.frame], view.settings)
         assert isinstance(found, GapMeasurement)
-        assert row.gap_px == found.gap_px
+        assert row.gap_px is not None
+        assert row.u_shift_px is not None
         assert row.input_mm == 0.25
+        # What was not kept is as wrong as before, and says so.
+        assert abs(row.gap_px - found.gap_px) <= (0.0 if kept_px else 1.1 * row.u_shift_px)
+    assert kept_px or len(rows) > len(again)
 
 
 def test_pictures_do_not_wait_in_memory_while_the_camera_is_learnt(
