@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.errors import CalibrationError
+from calib.short_repr import ShortRepr
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int_]
@@ -75,8 +76,8 @@ class Board:
             )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BoardCorners:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BoardCorners(ShortRepr):
     """The corners visible in one picture.
 
     Parameters
@@ -104,6 +105,20 @@ def find_corners(grey: Grey, board: Board, name: str) -> BoardCorners:
     ------
     CalibrationError
         If the picture does not show this board.
+
+    Examples
+    --------
+    A chessboard of 10 x 7 squares that was drawn:
+
+    >>> import numpy as np, calib
+    >>> grey = np.full((320, 440), 230, np.uint8)
+    >>> for row, column in np.ndindex(7, 10):
+    ...     if (row + column) % 2 == 0:
+    ...         grey[20 + 40 * row : 60 + 40 * row, 20 + 40 * column : 60 + 40 * column] = 40
+    >>> board = calib.Board(9, 6, square_mm=2.0, u_square_mm=0.002)
+    >>> corners = calib.find_corners(grey, board, "board.png")
+    >>> corners.points_px.shape
+    (54, 2)
     """
     eight_bit = np.asarray(grey if grey.dtype == np.uint8 else grey // 257, dtype=np.uint8)
     found = _chessboard(eight_bit, board) if board.marker_mm is None else _charuco(eight_bit, board)

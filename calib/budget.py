@@ -105,7 +105,19 @@ class BudgetLine(ShortRepr):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Budget(ShortRepr):
-    """All sources of uncertainty of n distances."""
+    """All sources of uncertainty of n distances.
+
+    Examples
+    --------
+    >>> import numpy as np, calib
+    >>> scale = calib.StatedScale(34.0, 0.1).for_frames((640, 480))
+    >>> ends_px = np.array([[[100.0, 150.0], [300.0, 150.0]]])
+    >>> budget = scale.budget(ends_px, np.array([0.02]), np.array([True]))
+    >>> budget
+    Budget(lines=9 items)
+    >>> print(f"u = {1000.0 * budget.u_mm[0]:.0f} um")
+    u = 28 um
+    """
 
     lines: tuple[BudgetLine, ...]
 

@@ -25,6 +25,12 @@ class BareScale:
     ------
     ValueError
         If the scale is not positive.
+
+    Examples
+    --------
+    >>> import calib
+    >>> calib.BareScale(34.0)
+    BareScale(px_per_mm=34.0)
     """
 
     px_per_mm: float
@@ -122,6 +128,12 @@ class StatedScale(BareScale):
     ------
     ValueError
         If the scale or its uncertainty is impossible.
+
+    Examples
+    --------
+    >>> import calib
+    >>> print(f"{calib.StatedScale(34.0, 0.1).for_frames((640, 480)).u_px_per_mm:.2f} px/mm")
+    0.10 px/mm
     """
 
     u_px_per_mm: float

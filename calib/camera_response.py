@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.errors import CalibrationError
+from calib.short_repr import ShortRepr
 
 Floats = NDArray[np.float64]
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
@@ -29,8 +30,8 @@ MOST_BRIGHTER = 0.25
 FEWEST_POINTS = 8
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CameraResponse:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CameraResponse(ShortRepr):
     """A camera response: curve from stored levels to light.
 
     Parameters
@@ -141,8 +142,8 @@ class CameraResponse:
         return np.asarray(np.rint(table * (65535.0 / table[top_level])).astype(np.uint16)[grey])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MeasuredResponse:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class MeasuredResponse(ShortRepr):
     """A measured response with the residuals of its fit.
 
     Parameters
@@ -234,6 +235,13 @@ def standard_response(name: str) -> CameraResponse:
 
     With `_studio` appended to the name, the levels are those of a video with studio range. Light is stated relative to
     the lowest and the highest level, because the position of an edge depends on neither.
+
+    Examples
+    --------
+    >>> import calib
+    >>> response = calib.standard_response("srgb")
+    >>> print(f"half of the levels is {float(response.light[2048]):.2f} of the light")
+    half of the levels is 0.21 of the light
     """
     if name not in CURVES:
         raise CalibrationError(f"A standard camera response must be one of {', '.join(CURVES)}, but is {name}.")

@@ -123,6 +123,23 @@ def gauge_study(readings_mm: Sequence[Sequence[Sequence[float]]]) -> GaugeStudy:
     CalibrationError
         The recordings differ in parts or readings, a reading is missing, or there are fewer than two recordings or
         readings.
+
+    Examples
+    --------
+    Five gaps, four times in each of three recordings:
+
+    >>> import numpy as np, calib
+    >>> noise = np.random.default_rng(1)
+    >>> gaps_mm = np.arange(1.0, 6.0)[None, :, None]
+    >>> readings_mm = gaps_mm + 0.001 * noise.standard_normal((3, 5, 4)) + 0.001 * noise.standard_normal((3, 1, 1))
+    >>> study = calib.gauge_study(readings_mm.tolist())
+    >>> print(f"gauge repeatability and reproducibility: {1000 * study.grr_mm:.1f} um")
+    gauge repeatability and reproducibility: 1.2 um
+
+    The comparison of a reading with a certified value:
+
+    >>> calib.Agreement(5.0011, 0.0008, 5.0, 0.0003).agrees
+    True
     """
     lengths = {len(cell) for recording in readings_mm for cell in recording}
     if len(lengths) != 1 or len({len(recording) for recording in readings_mm}) != 1:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from calib.errors import CalibrationError
 from calib.parallel_edges import ParallelEdges
+from calib.short_repr import ShortRepr
 from calib.straight_edges import find_edge_pairs, has_square_end, straight_edges_in_view
 
 Grey = NDArray[np.uint8] | NDArray[np.uint16]
@@ -33,8 +34,8 @@ NOT_NOISE, CLEARLY_BETTER = 0.01, 0.3
 MOST_COMBINED = 12
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class KnownSize:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class KnownSize(ShortRepr):
     """A picture of an object whose size is known.
 
     Parameters
@@ -97,6 +98,16 @@ def find_widths(
     ------
     CalibrationError
         If there is no object, several objects, a clipped flank, or sizes that contradict each other.
+
+    Examples
+    --------
+    >>> import numpy as np, calib
+    >>> def bar(width_px):
+    ...     away = np.abs(np.arange(440) - 219.6) - 0.5 * width_px
+    ...     return np.rint(np.tile(220.0 - 180.0 * np.clip(0.5 - away, 0.0, 1.0), (300, 1))).astype(np.uint8)
+    >>> known = [calib.KnownSize(f"{mm} mm", "bar", mm, 0.001, bar(40.0 * mm)) for mm in (3.0, 5.0, 7.0)]
+    >>> [round(edges.width_px, 1) for edges in calib.find_widths(known)]
+    [120.0, 200.0, 280.0]
     """
     choices = [_choices(picture, find_edge_pairs(picture.grey, region), region) for picture in pictures]
     widths = _settled(pictures, choices) if px_per_mm is None else _expected(pictures, choices, px_per_mm)

@@ -123,6 +123,16 @@ def response_from_exposures(
     ------
     CalibrationError
         If there are too few pictures, the exposures are too similar, or the scene has no uniform areas.
+
+    Examples
+    --------
+    >>> import numpy as np, calib
+    >>> light = np.kron(np.linspace(0.02, 1.0, 48).reshape(6, 8), np.ones((16, 16)))
+    >>> exposures = [1.0, 0.5, 0.25, 0.125]
+    >>> pictures = [np.rint(255.0 * (light * each) ** (1 / 2.2)).astype(np.uint8) for each in exposures]
+    >>> measured = calib.response_from_exposures(pictures, exposures, 255, "my camera")
+    >>> print(f"exponent {measured.exponent:.1f}")
+    exponent 2.2
     """
     times = np.asarray(exposures, dtype=np.float64)
     if len(pictures) < FEWEST_PICTURES or not (times > 0.0).all() or times.max() < LEAST_RATIO * times.min():

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.short_repr import ShortRepr
+
 Floats = NDArray[np.float64]
 
 # Steps of the fixed-point iteration that inverts the distortion; for ordinary lenses each step improves the result by
@@ -12,8 +14,8 @@ Floats = NDArray[np.float64]
 UNDISTORT_STEPS = 25
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lens:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Lens(ShortRepr):
     """Radial and tangential distortion by the model of Brown (Photogrammetric Engineering 37(8), 1971, 855-866).
 
     Parameters
@@ -74,8 +76,8 @@ class Lens:
         return replace(self, parameters=parameters)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Plane:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Plane(ShortRepr):
     """Homography from the picture to the plane, scaled so that the picture's centre stays in place.
 
     Source: Hartley & Zisserman, Multiple View Geometry, 2nd ed., 2.3.

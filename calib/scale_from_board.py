@@ -14,6 +14,7 @@ from calib.limits import Limits, rectangular
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.picture_shift import centre_px, lens_shift_px
 from calib.projection import Lens, Plane, apply_homography
+from calib.short_repr import ShortRepr
 
 Floats = NDArray[np.float64]
 
@@ -25,8 +26,8 @@ STEP_PX = 0.01
 STEP_LENS = 1e-3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlaneFit:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PlaneFit(ShortRepr):
     """A plane fitted to the corners in one picture.
 
     Parameters
@@ -137,8 +138,8 @@ POSE, LENS = 6, 9
 WORTH_A_PARAMETER = 10.8
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LensFit:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LensFit(ShortRepr):
     """A fitted lens, with the residuals of the fit (px).
 
     Parameters
@@ -247,8 +248,8 @@ def straightness_px(corners: BoardCorners, lens: Lens | None) -> Floats:
     return np.concatenate(away) if away else np.zeros(0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BoardFit:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BoardFit(ShortRepr):
     """The calibration, with the residuals of its fit.
 
     Parameters
@@ -288,6 +289,20 @@ def scale_from_board(
         Width and height.
     limits, stated
         Limits of the set-up's imperfections, and the names of those that the user stated.
+
+    Examples
+    --------
+    The corners of an undistorted picture in which 1 mm is 20 pixels:
+
+    >>> import numpy as np, calib
+    >>> board = calib.Board(9, 6, square_mm=2.0, u_square_mm=0.002)
+    >>> cells = np.array([(column, row) for row in range(6) for column in range(9)])
+    >>> corners = calib.BoardCorners("board.png", 40.0 * cells + 60.0, cells, 2.0 * cells)
+    >>> fit = calib.scale_from_board([corners], board, (440, 320), calib.Limits(tilt_deg=0.5))
+    >>> print(f"{fit.calibration.px_per_mm:.2f} px/mm")
+    20.00 px/mm
+
+    With three pictures or more, `fit.lens.lens` is the `calib.Lens`; the `calib.Plane` is `fit.plane.plane`.
     """
     if not pictures:
         raise CalibrationError("A calibration needs at least one picture of the board, but there is none.")

@@ -12,6 +12,7 @@ from calib.line_scale import ScaleLines
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.picture_shift import lens_shift_px, tilt_shift_px
 from calib.scale_from_sizes import CHANCE
+from calib.short_repr import ShortRepr
 
 Floats = NDArray[np.float64]
 
@@ -20,8 +21,8 @@ Floats = NDArray[np.float64]
 OUTLIER_SIGMAS, OUTLIER_SHARE = 6.0, 0.02
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LineScaleFit:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LineScaleFit(ShortRepr):
     """The calibration from a line scale, with the residuals of the lines.
 
     Parameters
@@ -92,6 +93,18 @@ def scale_from_lines(
     ------
     CalibrationError
         If the pitch or an uncertainty is not valid, or the lines are not equidistant.
+
+    Examples
+    --------
+    >>> import numpy as np, calib
+    >>> away = np.abs((np.arange(440.0) - 10.0) % 40.0 - 20.25)
+    >>> away[:10] = away[410:] = 20.0
+    >>> row = 220.0 - 180.0 * np.clip(5.5 - away, 0.0, 1.0)
+    >>> lines = calib.find_lines(np.rint(np.tile(row, (120, 1))).astype(np.uint8))
+    >>> reference = calib.Reference("stage micrometer", 1.0, 0.0, certificate="no. 17")
+    >>> fit = calib.scale_from_lines(lines, 1.0, 0.0002, 0.0005, (440, 120), calib.Limits(), reference)
+    >>> print(f"{fit.calibration.px_per_mm:.2f} px/mm")
+    40.00 px/mm
     """
     _check(pitch_mm, u_line_mm, u_length_mm)
     index, used = _numbered(lines.at_px)

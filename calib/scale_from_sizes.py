@@ -13,6 +13,7 @@ from calib.limits import Limits, rectangular
 from calib.measured_scale import Calibration, Reference, Response, ScalePart
 from calib.parallel_edges import ParallelEdges
 from calib.picture_shift import change_of_distance_px, lens_shift_px, tilt_shift_px
+from calib.short_repr import ShortRepr
 from calib.straight_line import StraightLine, line_through_origin, line_with_errors
 
 Floats = NDArray[np.float64]
@@ -24,8 +25,8 @@ CHANCE = 0.01
 SAME_SIZE = 0.01
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MeasuredSize:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class MeasuredSize(ShortRepr):
     """One object of known size, measured in the picture.
 
     Parameters
@@ -54,8 +55,8 @@ class MeasuredSize:
         return cls(reference, edges.width_px, edges.u_width_px, edges.points_px, edges.light)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ScaleFit:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ScaleFit(ShortRepr):
     """The calibration from objects of known size, with the residuals of the fitted straight line.
 
     Parameters
@@ -103,6 +104,27 @@ def scale_from_pictures(
     ------
     CalibrationError
         If there is no object, several objects, a clipped flank, or sizes that contradict each other.
+
+    Examples
+    --------
+    >>> import numpy as np, calib
+    >>> def bar(width_px):
+    ...     away = np.abs(np.arange(440) - 219.6) - 0.5 * width_px
+    ...     return np.rint(np.tile(220.0 - 180.0 * np.clip(0.5 - away, 0.0, 1.0), (300, 1))).astype(np.uint8)
+    >>> known = [calib.KnownSize(f"{mm} mm", "bar", mm, 0.001, bar(40.0 * mm)) for mm in (3.0, 5.0, 7.0)]
+    >>> fit = calib.scale_from_pictures(known)
+    >>> print(f"{fit.calibration.px_per_mm:.2f} px/mm, U = {2.0 * fit.calibration.u_px_per_mm:.2f} px/mm")
+    40.00 px/mm, U = 0.03 px/mm
+
+    A distance between two points of a light gap, with its uncertainty and where it comes from:
+
+    >>> ends_px = np.array([[[100.0, 150.0], [300.0, 150.0]]])
+    >>> given = ends_px, np.array([0.02]), np.array([True])
+    >>> fit.calibration.distances(*given)
+    Distances(value_mm=array([5.]), u_mm=array([0.015...]), u_random_mm=array([0.0005]))
+    >>> budget = fit.calibration.budget(*given)
+    >>> max(budget.lines, key=lambda line: line.u_mm[0]).source
+    'distance from the calibrated plane'
     """
     if len({known.grey.shape for known in pictures}) > 1:
         told = ", ".join(f"{known.name} {known.grey.shape[1]}x{known.grey.shape[0]}" for known in pictures)
@@ -137,6 +159,20 @@ def scale_from_sizes(
         Largest excess of a light gap's measured width because the camera response is assumed; 0 if the response is
         known. The true excess lies between 0 and this value; the standard uncertainty is that of a rectangular
         distribution of this half-width. If the edge bias is determined, it includes this effect.
+
+    Examples
+    --------
+    Widths that were measured in another way:
+
+    >>> import numpy as np, calib
+    >>> ends_px = np.array([[160.0, 150.0], [280.0, 150.0]])
+    >>> sizes = [
+    ...     calib.MeasuredSize(calib.Reference(f"bar {mm}", mm, 0.001), 40.0 * mm - 0.4, 0.02, ends_px, light=False)
+    ...     for mm in (3.0, 5.0, 7.0)
+    ... ]
+    >>> fit = calib.scale_from_sizes(sizes, (440, 300))
+    >>> print(f"{fit.calibration.px_per_mm:.2f} px/mm, edge bias {fit.calibration.edge_bias_px:.2f} px")
+    40.00 px/mm, edge bias -0.40 px
     """
     if not sizes:
         raise CalibrationError("A scale needs at least one object of known size, but there is none.")

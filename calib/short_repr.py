@@ -4,8 +4,8 @@ from dataclasses import fields
 
 import numpy as np
 
-LONGEST = 40
-"""Longest text of a value (characters) that is printed as it is."""
+LONGEST, LONGEST_RECORD = 40, 200
+"""Longest text (characters) of a value, and of a record within a record, that is printed as it is."""
 
 
 class ShortRepr:
@@ -44,4 +44,5 @@ def _told(value: object) -> str:
         return whole
     if isinstance(value, tuple | list | dict) or hasattr(value, "keys"):
         return f"{len(value)} {'entries' if hasattr(value, 'keys') else 'items'}"  # type: ignore[arg-type]
-    return whole if isinstance(value, ShortRepr) else f"{whole[:LONGEST]}..."
+    is_record = isinstance(value, ShortRepr) and len(whole) <= LONGEST_RECORD
+    return whole if is_record else f"{whole[:LONGEST]}..."

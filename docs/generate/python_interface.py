@@ -2,6 +2,7 @@
 
 import importlib
 import inspect
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -25,6 +26,13 @@ FOR_AUTHORS = {
     "fingervision.domain.drawing_form": ("DrawingForm",),
 }
 """What the author of a device or an effect imports beside `fingervision` itself, by module."""
+WHOLE_EXAMPLES = {
+    "fingervision.testbed.": ("tutorials/own_stage.md", "Your own stage"),
+    "fingervision.testing.": ("how_to/extend.md", "Extend it"),
+    "fingervision.domain.": ("how_to/extend.md", "Extend it"),
+    "fingervision.storage.": ("how_to/extend.md", "Extend it"),
+}
+"""Page that uses a name in a whole example, by the beginning of the name."""
 PAGES = "python"
 """Folder of the pages, beside the page that lists them."""
 
@@ -43,7 +51,41 @@ def python_page(folder: Path) -> str:
         ],
         "fingervision.testing, the contract tests": [(testing, name) for name in testing.__all__],
     }
-    return "\n".join(_section(title, things, folder) for title, things in sections.items())
+    examples = _Examples(
+        [(fingervision, name) for name in fingervision.__all__] + [(calib, name) for name in calib.__all__]
+    )
+    return "\n".join(_section(title, things, folder, examples) for title, things in sections.items())
+
+
+class _Examples:
+    """The examples of docstrings, and for a record without one the first that makes it or names it."""
+
+    def __init__(self, things: list[tuple[ModuleType, str]]) -> None:
+        self._held = [(f"{module.__name__}.{name}", getattr(module, name)) for module, name in things]
+
+    def beside(self, thing: Any) -> str:
+        """Text with the example of another page; empty if the object has an example of its own, or there is none."""
+        if not inspect.isclass(thing) or _example(thing):
+            return ""
+        for path, other in self._held:
+            makes = getattr(other, "__annotations__", {}).get("return") in (thing, thing.__name__)
+            if makes and _example(other):
+                return _quoted(path, _example(other))
+        for path, other in self._held:
+            if re.search(rf"\b{thing.__name__}\b", _example(other)):
+                return _quoted(path, _example(other))
+        kind = fingervision.FingervisionError
+        return _quoted("fingervision.FingervisionError", _example(kind)) if issubclass(thing, kind) else ""
+
+
+def _example(thing: Any) -> str:
+    """Text of the section Examples of a docstring, which is the last section."""
+    _, _, found = (inspect.getdoc(thing) or "").partition("\nExamples\n--------\n")
+    return found
+
+
+def _quoted(path: str, example: str) -> str:
+    return f".. rubric:: Example of :py:obj:`{path}`\n\n{example}\n"
 
 
 def _classes(module: ModuleType, *, errors: bool) -> list[str]:
@@ -51,19 +93,29 @@ def _classes(module: ModuleType, *, errors: bool) -> list[str]:
     return [name for name in names if issubclass(getattr(module, name), Exception) is errors]
 
 
-def _section(title: str, things: list[tuple[ModuleType, str]], folder: Path) -> str:
+def _section(title: str, things: list[tuple[ModuleType, str]], folder: Path, examples: _Examples) -> str:
     rows, pages = [], []
     for module, name in things:
         path = f"{module.__name__}.{name}"
         # On some file systems, `fingervision.Batch` and `fingervision.batch` are one name.
         page = f"{path}-{'class' if inspect.isclass(getattr(module, name)) else 'use'}"
         (folder / f"{page}.md").write_text(
-            f"# {name}\n\n```{{eval-rst}}\n{_entry(module, name)}\n```\n", encoding="utf-8"
+            f"# {name}\n\n```{{eval-rst}}\n{_entry(module, name)}\n\n{examples.beside(getattr(module, name))}```\n"
+            f"{_whole_example(path)}",
+            encoding="utf-8",
         )
         rows.append(f"| [`{path}`]({PAGES}/{page}.md) | {_first_sentence(getattr(module, name))} |")
         pages.append(f"{PAGES}/{page}")
     tree = "\n".join(["```{toctree}", ":hidden:", "", *pages, "```"])
     return "\n".join([f"### {title}", "", "| name | what it is |", "|---|---|", *rows, "", tree, ""])
+
+
+def _whole_example(path: str) -> str:
+    """Sentence that says where what an author of devices or effects needs stands in a whole example."""
+    for begin, (page, words) in WHOLE_EXAMPLES.items():
+        if path.startswith(begin):
+            return f"\nA whole example: [{words}](../../{page}).\n"
+    return ""
 
 
 def _first_sentence(thing: Any) -> str:

@@ -222,6 +222,16 @@ class Batch:
         Number of inputs that were processed by this call.
     stopped : str
         Reason why the batch stopped early; empty for a complete batch.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import fingervision as fv
+    >>> done = fv.batch.measure(
+    ...     "sample_frames/table1/frame_0[01].png", out=tempfile.mkdtemp() + "/all", px_per_mm=34.0, jobs=1
+    ... )
+    >>> len(done.outcomes), done.fresh, done.bad
+    (2, 2, ())
     """
 
     out: Path

@@ -22,9 +22,10 @@ version.
     └── PluginError                  a plug-in cannot be used; its classes are in `fingervision.plugins.faults`
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from enum import IntEnum
+from typing import Any
 
 
 class ExitCode(IntEnum):
@@ -40,9 +41,29 @@ class FingervisionError(Exception):
     """An operation could not be done; the message states the reason in one sentence.
 
     The command line prints the message without a traceback and ends with `exit_code`.
+
+    Examples
+    --------
+    >>> import fingervision as fv
+    >>> try:
+    ...     fv.measure("no_such_file.mp4", px_per_mm=34.0)
+    ... except fv.FingervisionError as error:
+    ...     print(type(error).__name__, isinstance(error, OSError))
+    InputFileError True
     """
 
     exit_code = ExitCode.COULD_NOT
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how a pickle makes the error: from its message, because some are made of other arguments."""
+        return _again, (type(self), self.args, vars(self))
+
+
+def _again(kind: type[Exception], args: tuple[Any, ...], held: Mapping[str, Any]) -> Exception:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    vars(error).update(held)
+    return error
 
 
 class UsageError(FingervisionError):

@@ -17,6 +17,12 @@ class Coding(StrEnum):
 
     A lossy codec that codes every picture independently (JPEG) causes errors that are correlated over a few pixels; a
     codec that predicts a picture from neighbouring pictures (H.264) displaces whole blocks.
+
+    Examples
+    --------
+    >>> import fingervision as fv
+    >>> fv.Coding("intraframe")
+    <Coding.INTRAFRAME: 'intraframe'>
     """
 
     LOSSLESS = "lossless"
@@ -42,6 +48,13 @@ class Frame:
         Whether the picture is coded as a difference from other pictures.
     quantiser : Quantiser or None
         Quantiser steps of the codec for this picture; None if the stream does not state them.
+
+    Examples
+    --------
+    >>> import numpy as np, fingervision as fv
+    >>> frame = fv.Frame(np.zeros((240, 320), np.uint8), index=0, time_s=0.0)
+    >>> frame.lossy
+    False
     """
 
     pixels: Pixels
@@ -81,6 +94,12 @@ class LostFrame:
         `Status.DAMAGED` or `Status.DUPLICATE`.
     words : str
         Sentence that states what happened to the frame.
+
+    Examples
+    --------
+    >>> import fingervision as fv
+    >>> fv.LostFrame(3, 0.12, fv.Status.DAMAGED, "The camera lost it.").status
+    <Status.DAMAGED: 'damaged'>
     """
 
     index: int

@@ -4,7 +4,15 @@ from enum import StrEnum
 
 
 class Status(StrEnum):
-    """Status of a video frame; the reasons are tested in this order, and the first that applies is stated."""
+    """Status of a video frame; the reasons are tested in this order, and the first that applies is stated.
+
+    Examples
+    --------
+    >>> import fingervision as fv
+    >>> row = fv.measure("sample_frames/table1/frame_00.png", px_per_mm=34.0)[0]
+    >>> row.status == fv.Status.OK
+    True
+    """
 
     OK = "ok"
     DAMAGED = "damaged"

@@ -6,9 +6,11 @@ files, and from the present session.
 
 import copyreg
 import importlib
+import pickle
 import pkgutil
 import sys
 from contextlib import AbstractContextManager
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -25,14 +27,33 @@ __all__ = ["REGISTRY", "added_effects", "catalogue", "origin_of", "register", "t
 
 
 def _pickled(effect: Effect) -> str | tuple[Any, ...]:
-    """Pickle an effect of this package by its name, because its functions may be lambdas; another effect as it is."""
+    """Pickle an effect of this package, or a decorated function, by its name, and another effect as it is.
+
+    What a notebook or script decorates is sent whole by cloudpickle, where that is in use (by Dask and joblib).
+    """
     if _built_in().get(effect.name) is effect:
         return _unpickled, (effect.name,)
-    return object.__reduce_ex__(effect, 2)
+    act = getattr(effect, "act", None)
+    home = getattr(act, "__module__", ""), getattr(act, "__qualname__", "")
+    if getattr(sys.modules.get(home[0]), home[1], None) is not effect:
+        return object.__reduce_ex__(effect, 2)
+    if home[0] == "__main__" and "cloudpickle" in sys.modules:
+        values = {each.name: getattr(effect, each.name) for each in fields(effect)}
+        return _made_of, (type(effect), sys.modules["cloudpickle"].dumps(values))
+    return _imported, home
 
 
 def _unpickled(name: str) -> Effect:
     return _built_in()[name]
+
+
+def _imported(module: str, name: str) -> Effect:
+    found: Effect = getattr(importlib.import_module(module), name)
+    return found
+
+
+def _made_of(kind: type[Effect], values: bytes) -> Effect:
+    return kind(**pickle.loads(values))
 
 
 for _kind in (Effect, DriveEffect, PointEffect):

@@ -51,6 +51,16 @@ class Description:
         Sentences that the user should know about the recording.
     camera : mapping of str to str
         Settings stated by a camera, with their units.
+
+    Examples
+    --------
+    >>> import fingervision as fv
+    >>> described = fv.Description(
+    ...     name="my camera", kind="camera", codec="none", coding=fv.Coding.LOSSLESS, width_px=640, height_px=480,
+    ...     rate_hz=25.0, has_times=True, frame_count=None,
+    ... )
+    >>> described.coding
+    <Coding.LOSSLESS: 'lossless'>
     """
 
     name: str
@@ -73,7 +83,22 @@ class Description:
 
 
 class FrameSource(Protocol):
-    """A recording or a camera: it yields frames in order, each a picture or marked as lost; each is read once."""
+    """A recording or a camera: it yields frames in order, each a picture or marked as lost; each is read once.
+
+    Examples
+    --------
+    >>> import numpy as np, fingervision as fv
+    >>> class Dark:
+    ...     '''Three black pictures.'''
+    ...
+    ...     description = fv.Description("dark", "array", "none", fv.Coding.LOSSLESS, 320, 240, 25.0, True, 3)
+    ...
+    ...     def __iter__(self):
+    ...         for index in range(3):
+    ...             yield fv.Frame(np.zeros((240, 320), np.uint8), index, 0.04 * index)
+    >>> fv.measure(Dark(), px_per_mm=34.0).counts
+    {'low_contrast': 3}
+    """
 
     @property
     def description(self) -> Description:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import PointMm
+from fingervision.domain.made_again import MadeAgain
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import BodyPose
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, MechanismEquilibrium
@@ -148,7 +149,7 @@ def observables(mechanism: Mechanism, probes_by: Mapping[str, Array]) -> dict[st
     }
 
 
-class ElasticMechanism(ABC):
+class ElasticMechanism(MadeAgain, ABC):
     """Elastic model of a drawn mechanism.
 
     Parameters

@@ -1,15 +1,17 @@
 """A model that is a function of time: an FMU, a Python file with `simulate(time_s, input_mm)`, or such a function."""
 
 import json
+import pickle
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -75,6 +77,10 @@ class FunctionModel:
     path: Path
     names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     function: Function | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how a pickle makes the model: a function that cannot be pickled stays in its process."""
+        return _unpickled, (self.path, self.names, None if self.function is None else _pickled(self.function))
 
     def respond(self, input_mm: Array) -> Response:
         """Static response at each input, which is held until the gap has settled; `input_mm` of shape (n,)."""
@@ -179,6 +185,32 @@ class FunctionModel:
             return f"{self.path} must answer, but crashed ({name}): correct the model; no data were lost."
         last = f" The last line of its error output: {said[-1][:300]}" if said else ""
         return f"{self.path} must answer, but its process ended with code {code}: correct the model.{last}"
+
+
+PICKLED_BY = ["pickle", "cloudpickle"]
+"""Modules that pickle a function; cloudpickle, which is there with Dask and joblib, pickles lambdas too."""
+
+
+def _pickled(function: Function) -> bytes:
+    """Pickle a function; b"" if it cannot be pickled."""
+    for by in PICKLED_BY:
+        try:
+            return cast("bytes", import_module(by).dumps(function))
+        except Exception:  # a function may hold anything, and pickling it raise anything
+            continue
+    return b""
+
+
+def _unpickled(path: Path, names: Mapping[str, str], function: bytes | None) -> FunctionModel:
+    def stayed(time_s: Array, input_mm: Array) -> Array:
+        raise ValueError(
+            "must be one that can be pickled, but stayed in the process that pickled this result: define it with `def` "
+            "in a module, or install cloudpickle."
+        )
+
+    if function is None:
+        return FunctionModel(path, names)
+    return FunctionModel(path, names, pickle.loads(function) if function else stayed)
 
 
 SAYS = "fingervision-model: "

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from fingervision.domain.gripper import Gripper
+from fingervision.domain.made_again import MadeAgain
 from fingervision.domain.response import Response
 from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress, Physics
 from fingervision.models.elastic_mechanism import ElasticMechanism, pair_distances_mm
@@ -55,7 +56,7 @@ def covered_inputs_mm(gripper: Gripper, first_touch_mm: float | None) -> tuple[f
     return min(ends), max(ends)
 
 
-class DrawnGripper:
+class DrawnGripper(MadeAgain):
     """Model of a gripper with two identical halves.
 
     Parameters

@@ -210,7 +210,7 @@ class Runner:
 
 @dataclass(frozen=True, slots=True)
 class RunDone:
-    """Result of a completed run.
+    r"""Result of a completed run.
 
     Parameters
     ----------
@@ -222,6 +222,19 @@ class RunDone:
         Number of frames recorded before an interruption; 0 for a new run.
     table : Path
         Measured table of the run, joined with the earlier run that it continues.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import fingervision as fv
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> step = 'kind = "move"\nto_mm = 0.2\nspeed_mm_s = 0.4'
+    >>> _ = (folder / "recipe.toml").write_text(f'schema = 1\nname = "open"\n[[step]]\n{step}\n')
+    >>> with fv.bed("simulated", seed=1) as bed:
+    ...     done = bed.run(folder / "recipe.toml", folder / "run")
+    >>> done.counts.with_gap == done.counts.recorded, done.table.name
+    (True, 'samples.csv')
     """
 
     folder: Path
