@@ -47,6 +47,7 @@ def fit_scenes(
     others: Sequence[Family] = (),
     steps: Sequence[float] = (),
     *,
+    codec: float = 0.0,
     scenes: Sequence[Scene] = SCENES,
 ) -> list[EdgeFit]:
     """Fit everything that may stand beside the edges, the most probable first.
@@ -63,11 +64,13 @@ def fit_scenes(
         Families that are fitted with nothing beside the edges, and with scenes that the first family does not exclude.
     steps : sequence of float
         Steps of a codec's quantiser for the eight frequencies across an edge (shares of full scale); empty without one.
+    codec : float
+        Standard deviation of what a codec leaves of a plateau's levels (share of the contrast).
     scenes : sequence of Scene
         What may stand beside the edges; pairs are tried if all may.
     """
-    data = EdgeData.of(profiles, steps=steps, discrepancy=discrepancy, is_wide=True)
-    coarse = EdgeData.of(profiles, steps=steps, discrepancy=discrepancy, is_wide=True, every=COARSE)
+    data = EdgeData.of(profiles, steps=steps, discrepancy=discrepancy, codec=codec, is_wide=True)
+    coarse = EdgeData.of(profiles, steps=steps, discrepancy=discrepancy, codec=codec, is_wide=True, every=COARSE)
     narrowest = min(edge_width(profile) for profile in profiles)
 
     fits = [fitted(family, data, data.start()) for family in families]
@@ -83,7 +86,7 @@ def fit_scenes(
     if scenes is SCENES and float(np.mean(best.misfit)) > LEAVES_MORE:
         for scene in PAIRS:
             fits += _fits(scene, families[:1], data, coarse, narrowest)
-    fits += _less_exact(fits, profiles, discrepancy, steps, by_pixels=data.by_pixels)
+    fits += _less_exact(fits, profiles, discrepancy, steps, codec, by_pixels=data.by_pixels)
     least = max(fit.log_evidence for fit in fits) - HOPELESS
     begun = [fit for fit in fits if fit.family is families[0] and (fit.scene is NOTHING or fit.log_evidence > least)]
     for fit in begun:
@@ -101,6 +104,7 @@ def _less_exact(
     profiles: Sequence[EdgeProfile],
     discrepancy: float,
     steps: Sequence[float],
+    codec: float,
     *,
     by_pixels: bool,
 ) -> list[EdgeFit]:
@@ -116,7 +120,12 @@ def _less_exact(
             break
         # A part of what is left is independent from bin to bin, as what the pixels of a sharp edge leave.
         data = EdgeData.of(
-            profiles, 0.5 * times * discrepancy, steps=steps, discrepancy=times * discrepancy, is_wide=True
+            profiles,
+            0.5 * times * discrepancy,
+            steps=steps,
+            discrepancy=times * discrepancy,
+            codec=times * codec,
+            is_wide=True,
         )
         data = replace(data, by_pixels=by_pixels)
         tried = [_refitted(fit, data) for fit in tried]
@@ -146,10 +155,14 @@ def _fits(
 
 
 def is_more_beside(
-    profiles: Sequence[EdgeProfile], model_error: float, family: Family, steps: Sequence[float] = ()
+    profiles: Sequence[EdgeProfile],
+    model_error: float,
+    family: Family,
+    steps: Sequence[float] = (),
+    codec: float = 0.0,
 ) -> bool:
     """Whether steps of light beside the edges would explain what the fit of a family leaves (score test)."""
-    data = with_smoothing(EdgeData.of(profiles, model_error, steps=steps, is_wide=True), [family])
+    data = with_smoothing(EdgeData.of(profiles, model_error, steps=steps, codec=codec, is_wide=True), [family])
     fit = fitted(family, data, data.start())
     wider = fit.edges[data.own_places()[:, -1]]
     if abs(float(wider[~data.is_outer].mean() - wider[data.is_outer].mean())) > WIDER_INSIDE:

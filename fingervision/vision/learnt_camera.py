@@ -11,6 +11,7 @@ from calib.edge_profile import EdgeProfile
 from calib.edge_response import LINEAR_PRIOR, ResponsePosterior, fit_families, probabilities
 from calib.tone_curves import family
 from fingervision.domain.camera import (
+    BesideEdges,
     CameraModel,
     CameraQuantity,
     Origin,
@@ -130,11 +131,23 @@ def learnt_from_profiles(
     if camera.response.curve is assumed:
         same = [fit for fit in every if fit.family.name == assumed.name]
         if any(fit.scene.name for fit in same):
-            camera = replace(camera, beside=beside_edges(same, sight.profiles))
+            told = sum(float(p) for p, fit in zip(probabilities(every), every, strict=True) if fit.scene.name)
+            camera = replace(camera, beside=_if_told(beside_edges(same, sight.profiles), told))
     if coding is not Coding.INTERFRAME:
         u_px = u_of_rivals_px(every, probabilities(every), sight.profiles, camera.response.curve.name)
         camera = replace(camera, beside=less_sure(camera.beside, u_px))
     return camera
+
+
+def _if_told(beside: BesideEdges | None, told: float) -> BesideEdges | None:
+    """What stands beside the edges if that is more probable than plain edges behind any tone curve.
+
+    Otherwise plain edges stay where they are, and what would displace them is in their uncertainty.
+    """
+    if beside is None or told > 0.5:
+        return beside
+    u_px = float(np.hypot(beside.u_gap_px, sum(beside.inner_px)))
+    return less_sure(None, u_px)
 
 
 def _with_response(

@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 # Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
 MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.01}
 # Standard deviation of a real edge about the best model, smooth over a pixel, as a share of its contrast: optics
-# (0.003) with what real walls, lines and shadows differ from the models; JPEG of quality 85; H.264.
-DISCREPANCY = {Coding.LOSSLESS: 0.004, Coding.INTRAFRAME: 0.006, Coding.INTERFRAME: 0.012}
+# (0.003) with what real walls, lines and shadows differ from the models. What a codec leaves beside it (`CODEC_PX`).
+DISCREPANCY, CODEC = 0.004, 0.002
 # Steps of the quantiser for the eight frequencies across an edge, as shares of full scale: the luminance table of JPEG
 # (ITU-T T.81, annex K.1, first row) at quality 75, the default of most programs, which halves it.
 STEPS = {Coding.INTRAFRAME: tuple(0.5 * step / 255.0 for step in (16, 11, 10, 16, 24, 40, 51, 61))}
@@ -111,7 +111,7 @@ class FlankSight:
         # Pixels that share their noise were processed (digital zoom, noise reduction, compression before), which
         # changes the edges as well; the discrepancy of a codec that predicts pictures contains this.
         shared = 1.0 if coding is Coding.INTERFRAME else float(np.median([edges.shared_on_both for _, edges in seen]))
-        return cls(profiles, coding, DISCREPANCY[coding] * shared, (float(flank), float(tip)))
+        return cls(profiles, coding, DISCREPANCY * shared, (float(flank), float(tip)))
 
     def inverted(self, response: CameraResponse) -> "FlankSight":
         """Flanks of light fingers as those of dark ones in the negative of their light."""
@@ -120,6 +120,11 @@ class FlankSight:
             profiles=[_negative(profile, response) for profile in self.profiles],
             scenes=tuple(scene for scene in SCENES if scene.name in ("", "wall")),
         )
+
+    @property
+    def codec(self) -> float:
+        """Standard deviation of what a codec leaves of a plateau's levels (share of the contrast)."""
+        return 0.0 if self.coding is Coding.LOSSLESS else CODEC
 
     @property
     def can_tell(self) -> bool:
@@ -132,8 +137,9 @@ class FlankSight:
 
     def is_more_beside(self, family: Family) -> bool:
         """Whether the edges show more than steps of light behind this tone curve."""
-        steps = STEPS.get(self.coding, ())
-        return self.can_tell and is_more_beside(self.profiles, MODEL_ERROR[self.coding], family, steps)
+        return self.can_tell and is_more_beside(
+            self.profiles, MODEL_ERROR[Coding.LOSSLESS], family, STEPS.get(self.coding, ()), self.codec
+        )
 
     def fits(self, families: Sequence[Family], others: Sequence[Family] = ()) -> list[EdgeFit]:
         """Fits of all scenes with the evidence of the tips, the most probable first; see `fit_scenes`.
@@ -141,8 +147,9 @@ class FlankSight:
         A wall is not seen at the tip, and motion does not widen it; shadows and bright lines are seen there as well, if
         not equally.
         """
+        steps = STEPS.get(self.coding, ())
         fits = fit_scenes(
-            self.profiles, self.discrepancy, families, others, STEPS.get(self.coding, ()), scenes=self.scenes
+            self.profiles, self.discrepancy, families, others, steps, codec=self.codec, scenes=self.scenes
         )
         if self.blurs_px is None:
             return fits

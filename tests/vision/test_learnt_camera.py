@@ -147,10 +147,10 @@ def test_a_chamfer_that_a_tone_curve_imitates_is_in_the_uncertainty(seed: int) -
         for near in (np.abs(each.away_px) < 8.0,)
     ]
     camera = learnt_from_profiles(
-        narrow, ASSUMED_CAMERA, Coding.LOSSLESS, FlankSight(wide, Coding.LOSSLESS, DISCREPANCY[Coding.LOSSLESS])
+        narrow, ASSUMED_CAMERA, Coding.LOSSLESS, FlankSight(wide, Coding.LOSSLESS, DISCREPANCY)
     )
     assert camera.beside is not None
-    fits = fit_scenes(wide, DISCREPANCY[Coding.LOSSLESS], [fixed_family(camera.response.curve)])
+    fits = fit_scenes(wide, DISCREPANCY, [fixed_family(camera.response.curve)])
     beside = less_sure(beside_edges(fits, wide), camera.beside.u_gap_px)
     assert beside is not None
     plain = next(fit for fit in fits if fit.scene is NOTHING)
@@ -177,7 +177,7 @@ def test_other_tone_curves_are_no_rivals_of_a_stated_one() -> None:
             narrow,
             stated_camera(response),
             Coding.LOSSLESS,
-            FlankSight(wide, Coding.LOSSLESS, DISCREPANCY[Coding.LOSSLESS]),
+            FlankSight(wide, Coding.LOSSLESS, DISCREPANCY),
         ).beside
         is None
     )
