@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from fingervision.domain.effect import Array
 from fingervision.domain.loops import loop
 from fingervision.motion.encoder import input_sigma, on_lines
+from fingervision.motion.encoder_path import STANDS
 
 LINES = (241, 121, 61, 41, 27, 19, 13, 9, 7, 5)
 PARABOLAS = (121, 61, 41, 27, 19, 13, 9, 7)
@@ -116,6 +117,36 @@ def _averaged(values: Array, time_s: Array, half_widths: Array) -> Array:
     return out
 
 
+CORNER_ROWS = 3
+"""Number of rows on either side of a corner that smoothing distorts."""
+
+
+def flattened(input_mm: Array, sigma_mm: float, still: float) -> Array:
+    """Replace the positions during a rest by one position that the neighbouring path does not overshoot.
+
+    Smoothing makes corners overshoot by some standard deviations of a row, and a smoothed rest wanders: the modelled
+    play follows each overshoot, and the farthest place of each rest. `still` is the motion from row to row (mm) below
+    which the stage may be at rest; 0 changes nothing.
+    """
+    if still == 0.0:
+        return input_mm
+    out = input_mm.copy()
+    stands = np.flatnonzero(np.diff(np.r_[0, (np.abs(np.diff(input_mm)) < still).astype(int), 0]))
+    for begin, end in stands.reshape(-1, 2):  # rows `begin` to `end`, both included
+        inner = input_mm[begin : end + 1]
+        if end - begin < 2 * CORNER_ROWS or np.ptp(inner[CORNER_ROWS:-CORNER_ROWS]) > 3.0 * sigma_mm:
+            continue
+        level = float(np.median(inner[CORNER_ROWS:-CORNER_ROWS]))
+        out[begin : end + 1] = np.where(np.abs(inner - level) <= 3.0 * sigma_mm, level, inner)
+        for rows, far in (
+            (slice(max(begin - CORNER_ROWS, 0), begin + CORNER_ROWS), max(begin - 2 * CORNER_ROWS, 0)),
+            (slice(end + 1 - CORNER_ROWS, end + 1 + CORNER_ROWS), min(end + 2 * CORNER_ROWS, out.size - 1)),
+        ):
+            below = input_mm[far] < level
+            out[rows] = np.minimum(out[rows], level) if below else np.maximum(out[rows], level)
+    return out
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SmoothedRecord:
     """A stage's record without the jitter about its encoder's lines, smoothed as far as its errors are random.
@@ -144,13 +175,27 @@ class SmoothedRecord:
     def of(cls, input_mm: Array, time_s: Array, runs: tuple[slice, ...]) -> "SmoothedRecord":
         """Estimate noise and encoder of a record, and smooth it."""
         snapped_mm = on_lines(input_mm, runs)
-        sigma_mm, step_mm = input_sigma(snapped_mm, runs, time_s)
-        smooth = snapped_mm, np.zeros(snapped_mm.size)
+        return cls.known(snapped_mm, time_s, runs, *input_sigma(snapped_mm, runs, time_s))
+
+    @classmethod
+    def known(
+        cls, recorded_mm: Array, time_s: Array, runs: tuple[slice, ...], sigma_mm: float, step_mm: float
+    ) -> "SmoothedRecord":
+        """Smooth a record of known noise and encoder."""
+        smooth = recorded_mm, np.zeros(recorded_mm.size)
         if sigma_mm > 0.0:
-            smooth = smoothed(snapped_mm, time_s, runs, sigma_mm, step_mm)
-        return cls(snapped_mm, time_s, runs, sigma_mm, step_mm, *smooth)
+            smooth = smoothed(recorded_mm, time_s, runs, sigma_mm, step_mm)
+        return cls(recorded_mm, time_s, runs, sigma_mm, step_mm, *smooth)
 
     @property
-    def blended_mm(self) -> Array:
-        """Smoothed values, blended with those of neighbouring windows (`blended`)."""
-        return blended(self.smooth_mm, self.recorded_mm, self.time_s, self.runs, self.leverage)
+    def path_mm(self) -> Array:
+        """Smoothed values, blended with those of neighbouring windows (`blended`), and constant in rests."""
+        if self.sigma_mm == 0.0:  # a record without noise is the path
+            return self.recorded_mm
+        out = blended(self.smooth_mm, self.recorded_mm, self.time_s, self.runs, self.leverage)
+        for run in self.runs:
+            steps = np.abs(np.diff(out[run]))
+            # Weighted by the way itself, the mean step is one of a motion, however long the rests are.
+            still = STANDS * float(steps @ steps) / max(float(steps.sum()), 1e-300)
+            out[run] = flattened(out[run], self.sigma_mm, still)
+        return out

@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 from fingervision.motion.encoder_path import STANDS, level_halts, piece, sharp_reversals
-from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
+from fingervision.motion.local_polynomial_smoothing import CORNER_ROWS, SmoothedRecord, flattened
 
-CORNER_ROWS = 3
-"""Number of rows on either side of a corner that smoothing distorts."""
 LONG_ROWS = 4 * CORNER_ROWS
 """Number of rows above which the ends of a stretch are left out when its rounding errors are examined."""
 AVERAGED = 0.5
@@ -120,7 +118,8 @@ class LogPath:
         smooth_mm, leverage = record.smooth_mm.copy(), record.leverage
         u_mm = sigma_mm * np.sqrt(leverage)
         for run in runs:
-            smooth_mm[run] = _flattened(smooth_mm[run], sigma_mm, leverage[run])
+            still = _standing_step(smooth_mm[run], sigma_mm, leverage[run])
+            smooth_mm[run] = flattened(smooth_mm[run], sigma_mm, still)
         still = _standing_step(smooth_mm, sigma_mm, leverage)
         shared = SharedErrors(np.zeros(0), np.zeros(1), np.zeros(1, dtype=np.bool_), np.zeros(1))
         if step_mm > 0.0:
@@ -223,32 +222,6 @@ def _standing_step(input_mm: Array, sigma_mm: float, leverage: Array) -> float:
     scatter = sigma_mm * np.minimum(leverage[:-1], leverage[1:]) ** 1.5
     moving = steps[steps > np.maximum(scatter, 1e-3 * float(np.ptp(input_mm)) / max(input_mm.size, 1))]
     return STANDS * float(np.median(moving)) if moving.size else 0.0
-
-
-def _flattened(input_mm: Array, sigma_mm: float, leverage: Array) -> Array:
-    """Replace the positions during a rest by one position that the neighbouring path does not overshoot.
-
-    Smoothing makes corners overshoot by some standard deviations of a row, and the modelled play is changed by each
-    overshoot.
-    """
-    still = _standing_step(input_mm, sigma_mm, leverage)
-    if still == 0.0:
-        return input_mm
-    out = input_mm.copy()
-    stands = np.flatnonzero(np.diff(np.r_[0, (np.abs(np.diff(input_mm)) < still).astype(int), 0]))
-    for begin, end in stands.reshape(-1, 2):  # rows `begin` to `end`, both included
-        inner = input_mm[begin : end + 1]
-        if end - begin < 2 * CORNER_ROWS or np.ptp(inner[CORNER_ROWS:-CORNER_ROWS]) > 3.0 * sigma_mm:
-            continue
-        level = float(np.median(inner[CORNER_ROWS:-CORNER_ROWS]))
-        out[begin : end + 1] = np.where(np.abs(inner - level) <= 3.0 * sigma_mm, level, inner)
-        for rows, far in (
-            (slice(max(begin - CORNER_ROWS, 0), begin + CORNER_ROWS), max(begin - 2 * CORNER_ROWS, 0)),
-            (slice(end + 1 - CORNER_ROWS, end + 1 + CORNER_ROWS), min(end + 2 * CORNER_ROWS, out.size - 1)),
-        ):
-            below = input_mm[far] < level
-            out[rows] = np.minimum(out[rows], level) if below else np.maximum(out[rows], level)
-    return out
 
 
 DRAWS = 48

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from fingervision.motion.encoder import input_sigma
-from fingervision.motion.local_polynomial_smoothing import blended, smoothed
+from fingervision.motion.local_polynomial_smoothing import SmoothedRecord, blended, smoothed
 
 Array = NDArray[np.float64]
 RATE_HZ = 8.0
@@ -129,3 +129,25 @@ def test_blending_keeps_lines_and_takes_out_the_zigzag_of_an_encoder() -> None:
     found, leverage = smoothed(recorded, t, whole, STEP_MM / np.sqrt(12.0), STEP_MM)
     rough, smooth = (np.std(np.diff(values - true)) for values in (found, blended(found, recorded, t, whole, leverage)))
     assert smooth < 0.7 * rough
+
+
+def _play(path: Array, width: float) -> Array:
+    """Play operator, point by point, engaged downwards at first."""
+    out, at = np.empty_like(path), path[0] + 0.5 * width
+    for i, x in enumerate(path):
+        at = min(max(at, x - 0.5 * width), x + 0.5 * width)
+        out[i] = at
+    return out
+
+
+def test_the_path_of_a_stage_at_rest_does_not_wander() -> None:
+    """A play follows the farthest point of a wandering path, so that a noisy rest would look like a larger play."""
+    t, rng = _time_s(60.0), np.random.default_rng(6)
+    true = np.interp(t, [0.0, 10.0, 20.0, 25.0, 60.0], [0.0, 1.0, -0.4, 0.2, 0.2])
+    rest = t > 26.0
+    behind = []
+    for _ in range(20):
+        recorded = true + SIGMA_MM * rng.standard_normal(t.size)
+        found = SmoothedRecord.of(recorded, t, (slice(0, t.size),)).path_mm
+        behind.append(np.mean((_play(found, 0.02) - _play(true, 0.02))[rest]))
+    assert abs(np.mean(behind)) < 3.0 * SIGMA_MM / np.sqrt(20.0 * rest.sum())

@@ -122,7 +122,7 @@ def expected_gain(
     gains: list[float] = []
     chances: list[float] = []
     for true, other in ((0, 1), (1, 0)):
-        starts = [pair[other].values, *_spread(found[other], FURTHER)]
+        further = _spread(found[other], FURTHER)
         truths = _spread(found[true], count)
         noisy = problems_of_drawn_noise(data, problem, pair[true], len(truths), rng)
         for values, first in zip(truths, noisy, strict=True):
@@ -130,9 +130,10 @@ def expected_gain(
             target = run.expected(values)
             # The offset of a run after a re-zeroing is estimated from both runs together.
             sigma_mm = None if rezeroed else _offsets(first, pair[true], rng)
-            after = run.score(target, pair[other], starts, sigma_mm) - run.score(target, pair[true], [values], sigma_mm)
             known = sigma_mm if first.offsets.runs > 1 else None
-            gains.append(after - (_score(first, pair[other], known) - _score(first, pair[true], known)))
+            rival, own = (_refitted(first, pair[each], known) for each in (other, true))
+            after = run.score(target, rival, [rival.values, *further], sigma_mm)
+            gains.append(after - run.score(target, own, [values], sigma_mm) - rival.score + own.score)
             chances.append(odds[true] / len(truths))
     mean = np.maximum(np.array(gains), 0.0)
     drawn = mean[rng.choice(mean.size, NOISES, p=np.array(chances) / sum(chances))]
@@ -155,13 +156,13 @@ def _offsets(problem: Problem, explanation: Explanation, rng: np.random.Generato
     return tuple(share * scale for scale in problem.offsets.scales_mm)
 
 
-def _score(problem: Problem, explanation: Explanation, sigma_mm: tuple[float, ...] | None) -> float:
-    """Chi-square of an explanation that is refitted to the measured data alone.
+def _refitted(problem: Problem, explanation: Explanation, sigma_mm: tuple[float, ...] | None) -> Explanation:
+    """Refit an explanation to the measured data alone.
 
     The standard deviation of the run offsets is fitted unless one is given.
     """
     sigma = explanation.sigma_mm if sigma_mm is None else sigma_mm
-    return fit(problem, explanation.names, explanation.values, sigma_mm=sigma, iterations=REFITTED).score
+    return fit(problem, explanation.names, explanation.values, sigma_mm=sigma, iterations=REFITTED)
 
 
 def _spread(points: Sequence[Point], count: int) -> Sequence[Point]:

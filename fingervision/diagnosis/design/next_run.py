@@ -42,8 +42,8 @@ WITHIN = 1.5
 this factor."""
 LIKELY = 0.02
 """Smallest probability, relative to the most probable explanation, of an explanation that is assumed true."""
-SCREENED = 4
-"""Iterations of a rival's refit while many runs are compared."""
+SCREENED = 1
+"""Iterations of a rival's refit while many runs are compared: it starts at the refit to the present data."""
 ALIKE = 0.03
 """Difference in the share of decided pairs below which two runs count as equally good."""
 
@@ -58,19 +58,19 @@ class OpenSet:
         Explanations, the best one first.
     odds : ndarray of float, shape (members,)
         Posterior probability of each explanation, with sum 1.
-    before : ndarray of float, shape (truths, members)
-        Distance between each assumed truth's prediction and each member for the present data; the assumed truths are
-        the first members.
+    refitted : list of list of Explanation, shape (truths, members)
+        Each member refitted to each assumed truth's prediction of the present data; the assumed truths are the first
+        members.
     """
 
     members: list[Explanation]
     odds: Array
-    before: Array
+    refitted: list[list[Explanation]]
 
     @property
     def truths(self) -> int:
         """Number of explanations that are taken as the truth in turn when a run is chosen."""
-        return len(self.before)
+        return len(self.refitted)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,12 +131,12 @@ class RunChoice:
             return None
         rezeroed = REZERO in steps
         run = AugmentedDataset.of(self.data, self.problem, inputs, rezeroed=rezeroed)
-        gains = np.full(self.open.before.shape, np.inf)
-        for j, truth in enumerate(self.open.members[: self.open.truths]):
-            for k, rival in enumerate(self.open.members):
+        gains = np.full((self.open.truths, len(self.open.members)), np.inf)
+        for j, rivals in enumerate(self.open.refitted):
+            for k, rival in enumerate(rivals):
                 if j != k:
-                    apart = run.distance(truth.values, rival, iterations=iterations)
-                    gains[j, k] = max(0.0, apart - self.open.before[j, k])
+                    apart = run.distance(self.open.members[j].values, rival, iterations=iterations)
+                    gains[j, k] = max(0.0, apart - rival.score)
         minutes = (PAUSE_S + inputs.size * self.step_s) / 60.0 + REZERO_MIN * rezeroed
         return RunPlan(name, steps, times, inputs, gains, minutes)
 
@@ -151,8 +151,8 @@ class RunChoice:
         if REZERO in run.steps:
             return run.apart(j, k)
         true, other = (j, k) if self.open.odds[j] >= self.open.odds[k] or k >= self.open.truths else (k, j)
-        truth, rival = self.open.members[true], self.open.members[other]
-        return second.distance(truth.values, rival, sigma_mm=rival.sigma_mm) - float(self.open.before[true, other])
+        truth, rival = self.open.members[true].values, self.open.refitted[true][other]
+        return second.distance(truth, rival, sigma_mm=self.open.members[other].sigma_mm) - rival.score
 
     def least(self, run: RunPlan) -> tuple[float, tuple[int, int]] | None:
         """The separated pair of explanations with the smallest gain, and this gain; None if no pair is separated.
@@ -190,13 +190,11 @@ def open_set(problem: Problem, members: list[Explanation]) -> OpenSet:
     costs = np.array([cost[id(e)] for e in listed])
     odds = np.exp(-0.5 * (costs - costs.min()))
     truths = 1 + int(np.count_nonzero(odds[1:MOST_TRUTHS] >= LIKELY))
-    before = np.zeros((truths, len(listed)))
-    for j, truth in enumerate(listed[:truths]):
-        target = problem.whitened(truth.values)
-        for k, rival in enumerate(listed):
-            if j != k:
-                before[j, k] = fit(problem, rival.names, rival.values, target=target, iterations=REFITTED).score
-    return OpenSet(listed, odds / odds.sum(), before)
+    targets = [problem.whitened(truth.values) for truth in listed[:truths]]
+    refitted = [
+        [fit(problem, e.names, e.values, target=target, iterations=REFITTED) for e in listed] for target in targets
+    ]
+    return OpenSet(listed, odds / odds.sum(), refitted)
 
 
 def next_run(

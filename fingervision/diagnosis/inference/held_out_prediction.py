@@ -120,7 +120,7 @@ def _predicted(data: Observations, problem: Problem, explanation: Explanation, h
     curve = data.position_map
     if curve is None:
         return predicted
-    numbers, _ = estimated_coefficients(rest, fitted, curve.columns_mm.shape[1], data.behind(curve))
+    numbers, _ = estimated_coefficients(rest, fitted, curve.columns_mm.shape[1], data.behind(curve, rest))
     return np.asarray(predicted + curve.columns_mm @ numbers)
 
 

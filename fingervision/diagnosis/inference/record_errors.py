@@ -23,7 +23,7 @@ from fingervision.diagnosis.noise.channel_noises import (
 from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
 from fingervision.motion.input_path import recorded
-from fingervision.motion.local_polynomial_smoothing import blended, smoothed
+from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
 
 FEWEST_POWERS = 20
 """Least number of values of the periodogram: the variance of white noise is then known to a third."""
@@ -262,5 +262,5 @@ def simulated_errors(data: Observations, rng: np.random.Generator) -> Iterator[A
         if step_mm > 0.0:
             zero = rng.random()
             read_mm = (np.round(read_mm / step_mm - zero) + zero) * step_mm
-        smooth_mm, leverage = smoothed(read_mm, time_s, runs, record.sigma_mm, step_mm)
-        yield (blended(smooth_mm, read_mm, time_s, runs, leverage) - path_mm)[rows]
+        again = SmoothedRecord.known(read_mm, time_s, runs, record.sigma_mm, step_mm)
+        yield (again.path_mm - path_mm)[rows]

@@ -25,15 +25,14 @@ from fingervision.diagnosis.inference.model_adequacy import VERY_STRONG, imitate
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.search_state import ROUGH, Findings, SearchState, beyond_form, noise_known
-from fingervision.diagnosis.inference.verdict import STANDING_SHARE
-from fingervision.diagnosis.input.observations import FORM, Observations
+from fingervision.diagnosis.inference.verdict import STANDING_SHARE, standing_of
+from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Flags
 
 PAIRS_REFITTED = 60
 """Number of pairs that are refitted jointly, in the order of their signatures' gain: 27 effects have 351 pairs."""
-PART_OF_UNKNOWN = 9.0
-"""Ratio, in chi-square, of the part that an effect explains to the remaining residual above which the effect is
-reported in addition to *unknown*: the residual is then a third of the disagreement, as RMS."""
+PART_OF_UNKNOWN = 1.0 / 3.0
+"""Share of the disagreement, as RMS, that effects may leave to be reported in addition to *unknown*."""
 PAIRS_EXTENDED = 6
 """Number of pairs with different predictions to which a third effect is added."""
 LIKELIEST = 6
@@ -169,9 +168,6 @@ def _findings(state: SearchState, forced: frozenset[str]) -> Findings:
     best = min(alternatives, key=lambda e: odds(problem, e)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
     if state.unknown is not None:
-        stands = max(0.0, best.score - problem.rows)
-        if nothing.score - best.score < PART_OF_UNKNOWN * stands and not forced & set(best.names):
-            best = nothing
         alternatives = [best] if best.names else []
     return Findings(
         best=best,
@@ -245,7 +241,7 @@ def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     # What the errors of path and formulas explain is no noise of the picture.
     left = problem.measured - problem.whitened(values)
     beside = replace(explanation, residual=left, sigma_mm=problem.offsets.spread(left)[0])
-    errors, _ = estimated_coefficients(problem, beside, columns_mm.shape[1], data.behind(FORM))
+    errors, _ = estimated_coefficients(problem, beside, columns_mm.shape[1], 0)
     return data.problem(residual_mm - columns_mm @ errors, free, explained=True, values=values)
 
 
@@ -276,6 +272,9 @@ class Look:
             if not _noise_is_too_large(found):
                 break
             found = look(found.best)
+        small = found.unknown is not None and standing_of(data, found).share > PART_OF_UNKNOWN
+        if small and not self.forced & set(found.best.names):
+            found = replace(found, best=found.nothing, alternatives=())
         found, said = consistent_with_gauges(data, found)
         return Searched(data, found, said)
 

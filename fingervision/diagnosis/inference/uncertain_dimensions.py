@@ -13,6 +13,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
+from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.domain.effect import Array
 from fingervision.domain.model import PhysicalModel
 
@@ -88,20 +89,19 @@ def _changes(drawn: PhysicalModel, moved: Mapping[str, float]) -> dict[str, floa
 
 
 def estimated(
-    refit: DrawingRefit, problem: Problem, explanation: Explanation
+    refit: DrawingRefit, problem: Problem, explanation: Explanation, behind: int
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Estimate the dimensions for an explanation, and their remaining uncertainty.
+
+    `behind` is the number of columns of random effects after those of the dimensions.
 
     Returns
     -------
     moved, known : dict of str to float
         Deviations, and remaining uncertainties, in standard uncertainties, by dotted name.
     """
-    offsets = problem.offsets
-    metric = offsets.metric(explanation.sigma_mm)
-    count = refit.columns.shape[1]
-    best = (metric @ (offsets.design.T @ explanation.residual))[-count:]
-    left = np.sqrt(np.maximum(np.diag(metric)[-count:], 0.0))
+    best, covariance = estimated_coefficients(problem, explanation, refit.columns.shape[1], behind)
+    left = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     names = list(refit.moved)
     return (
         dict(zip(names, np.clip(best, -FARTHEST, FARTHEST).tolist(), strict=True)),

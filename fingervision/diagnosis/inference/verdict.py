@@ -12,7 +12,7 @@ from fingervision.diagnosis.inference.model_adequacy import harmonics
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
-from fingervision.diagnosis.input.observations import FORM, FORM_SHARE_OF_RIGS, Observations
+from fingervision.diagnosis.input.observations import FORM_SHARE_OF_RIGS, Observations
 from fingervision.diagnosis.noise.channel_noises import most_noise
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.domain.effect import Array, Flags
@@ -244,17 +244,20 @@ def standing_of(data: Observations, found: Findings) -> Standing:
     before = data.stacked_mm - data.chain.stacked({})
     left = data.stacked_mm - data.chain.stacked(found.best.values) - form_error_mm(data, found)
     if data.position_map is not None:
-        left = left - data.position_map.refitted(found.problem, found.best, data.behind(data.position_map)).fitted_mm
+        behind = data.behind(data.position_map, found.problem)
+        left = left - data.position_map.refitted(found.problem, found.best, behind).fitted_mm
     if data.run_gains is not None:
-        data = replace(data, run_gains=data.run_gains.refitted(found.problem, found.best, data.behind(data.run_gains)))
+        gains = data.run_gains.refitted(found.problem, found.best, data.behind(data.run_gains, found.problem))
+        data = replace(data, run_gains=gains)
     return standing(data, found.problem, before, left)
 
 
 def form_error_mm(data: Observations, found: Findings) -> Array:
     """Estimated error of the formulas of the best explanation, as far as its kind is known; shape (m,) (mm)."""
-    columns_mm = data.form_errors_mm(found.best.values)
-    sizes, _ = estimated_coefficients(found.problem, found.best, columns_mm.shape[1], data.behind(FORM))
-    return np.asarray(columns_mm @ sizes + harmonics(found.problem, found.best).fitted_mm, dtype=np.float64)
+    error_mm, columns_mm = harmonics(found.problem, found.best).fitted_mm, data.form_errors_mm(found.best.values)
+    if columns_mm.shape[1] == found.problem.formed:
+        error_mm = error_mm + columns_mm @ estimated_coefficients(found.problem, found.best, found.problem.formed, 0)[0]
+    return np.asarray(error_mm, dtype=np.float64)
 
 
 def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict, str | None]:

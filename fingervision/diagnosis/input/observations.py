@@ -80,10 +80,13 @@ SEEN_STAMPS = 0.3
 noise: it then changes a variance by less than a tenth."""
 SHORT = 100
 """Number of samples below which no row is excluded before an effect is found."""
+DRAWING = "drawing"
+"""Name of the random effect of the drawing's uncertain dimensions (`DrawingRefit.columns`)."""
 PATH = "path"
 """Name of the random effect of the errors of the path (`Observations.path_errors_mm`)."""
 FORM = "form"
-"""Name of the random effect of the errors of formulas (`Observations.form_errors_mm`)."""
+"""Name of the random effect of the errors of formulas (`Observations.form_errors_mm`): the last one, because only an
+explanation with such a formula has columns of it."""
 NOTHING: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 """The model without effects."""
 SMALL_TURN = 0.02
@@ -171,8 +174,8 @@ class Observations:
     def random_effects_mm(self, values: Mapping[str, Mapping[str, float]]) -> tuple[tuple[object, Array], ...]:
         """Random effects beside an explanation, each with its columns, in the order used by a problem."""
         own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains, self.roundings) if one]
-        drawing = [("drawing", self.refit.columns)] if self.refit.moved else []
-        return (*own, (PATH, self.path_errors_mm(values)), (FORM, self.form_errors_mm(values)), *drawing)
+        drawing = [(DRAWING, self.refit.columns)] if self.refit.moved else []
+        return (*own, *drawing, (PATH, self.path_errors_mm(values)), (FORM, self.form_errors_mm(values)))
 
     def path_errors_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Change of the prediction per standard uncertainty of reversals, turning points and clock; shape (m, k)."""
@@ -185,17 +188,21 @@ class Observations:
 
     def form_errors_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Change of the prediction per standard deviation of each error of an inexact formula; shape (m, k)."""
-        predicted_mm, moved_mm = self.chain.stacked(values), list[Array]()
-        for name, effect in self.effects.items():
-            for other in effect.inexact(values.get(name, {})) if effect.inexact is not None else ():
-                moved_mm.append(self.chain.stacked({**values, name: other}) if name in values else predicted_mm)
-        return np.stack([predicted_mm, *moved_mm], axis=1)[:, 1:] - predicted_mm[:, None]
+        others = [
+            {**values, name: other}
+            for name, effect in self.effects.items()
+            if effect.inexact is not None and name in values
+            for other in effect.inexact(values[name])
+        ]
+        if not others:
+            return np.zeros((self.stacked_mm.size, 0))
+        return np.stack([self.chain.stacked(other) for other in others], axis=1) - self.chain.stacked(values)[:, None]
 
-    def behind(self, effect: object) -> int:
-        """Number of columns that follow the columns of a given random effect in the problem."""
+    def behind(self, effect: object, problem: Problem) -> int:
+        """Number of columns that follow the columns of a given random effect in a problem of these observations."""
         listed = self.random_effects_mm({})
         order = [one for one, _ in listed]
-        return sum(columns.shape[1] for _, columns in listed[order.index(effect) + 1 :])
+        return problem.formed + sum(int(columns.shape[1]) for _, columns in listed[order.index(effect) + 1 :])
 
     @property
     def stalled(self) -> frozenset[str]:
@@ -257,7 +264,8 @@ class Observations:
         stamps = self.recorded.stamps_mm
         if stamps is not None and np.any(stamps > SEEN_STAMPS * noises[0].total_mm):
             passing = np.hypot(passing, stamps)
-        beside = np.hstack([columns for _, columns in self.random_effects_mm(values)])
+        random = [columns for _, columns in self.random_effects_mm(values)]
+        beside = np.hstack(random)
         drawing = beside if beside.shape[1] else None
         whitener = Whitener(
             history,
@@ -275,7 +283,15 @@ class Observations:
             curve = whitener.one(self.position_map.fitted_mm)
             mapped = float(curve @ curve)
         return Problem(
-            self.chain, whitener.one(self.aim_mm), whitener, offsets, self.effects, share, self.stalled, mapped
+            self.chain,
+            whitener.one(self.aim_mm),
+            whitener,
+            offsets,
+            self.effects,
+            share,
+            self.stalled,
+            mapped,
+            random[-1].shape[1],
         )
 
     def without_stamps(self, residual_mm: Array) -> Array:
@@ -359,7 +375,7 @@ class Observations:
         drawn = self.model.base
         if not (self.refit.moved and isinstance(drawn, PhysicalModel)):
             return self
-        moved, known = estimated(self.refit, problem, explanation)
+        moved, known = estimated(self.refit, problem, explanation, self.behind(DRAWING, problem))
         model = with_moved(drawn, moved)
         rest_mm = float(model.respond(np.zeros(1)).gap_mm[0])
         chain = replace(self.chain, model=model).with_rest_gap(rest_mm)
