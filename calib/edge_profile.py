@@ -161,7 +161,10 @@ def _structure(
     excess = np.convolve(found - expected, np.ones(SMOOTHED), "same")
     if float(np.sum(found) / np.sum(expected)) < 1.0 + SURE / np.sqrt(0.5 * bins * len(sums)):
         return np.zeros(bins)
-    return np.asarray(np.sqrt(np.maximum(excess / SMOOTHED, 0.0) / total))
+    # Parts that know too few bins may have been the only ones of some bin.
+    seen = np.flatnonzero(total)
+    own = np.sqrt(np.maximum(excess[seen] / SMOOTHED, 0.0) / total[seen])
+    return np.asarray(np.interp(np.arange(bins), seen, own))
 
 
 def _smooth(variance: Floats) -> Floats:
