@@ -61,7 +61,7 @@ def moved_by_recording(
     own_px = 0.5 * (beside.u_outline_px if is_outline else beside.u_gap_px)
     # What the frame itself shows is explained as far as something is beside the edges.
     u_px = [float(np.hypot(own_px, (1.0 - beside.probability) * mark.shift_px)) for mark in edges.marks]
-    name = beside.name if beside.probability > 0.5 else edges.beside or beside.name
+    name = beside.name if beside.probability > 0.5 else edges.beside
     moved = replace(edges, position=position, marks=stated_marks(edges, u_px), beside=name)
     return moved if beside.added is None else _without_added(upright, moved, light, beside.added)
 
