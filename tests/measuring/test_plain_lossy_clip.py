@@ -39,7 +39,7 @@ def clip(path: Path, seed: int) -> list[float]:
 
 
 def test_plain_bars_are_measured_in_nearly_every_frame(tmp_path: Path) -> None:
-    for seed in (3, 4):
+    for seed in (3, 4, 22):  # 22 was 0.33 px off, because what the codec leaves looked like a chamfer
         gaps = clip(tmp_path / "plain.mp4", seed)
         found = list(fv.measure(tmp_path / "plain.mp4", px_per_mm=20.0))
         errors = [one.gap_px - gap for one, gap in zip(found, gaps, strict=True) if one.gap_px is not None]
