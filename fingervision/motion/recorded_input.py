@@ -149,12 +149,13 @@ class RecordedInput:
         if is_commanded(table.input_mm, table.runs, gap_of_input, table.gap_mm):
             return cls.exact(table, commanded=True)
         record = SmoothedRecord.of(along_mm, time_s, runs)
+        path_mm = record.path_mm
         rows = np.arange(along_mm.size) if table.path is None else table.path.rows
         is_motion, noise_mm = False, 0.0
         if record.sigma_mm > 0.0:
-            is_motion, noise_mm = _motion_in_fluctuations(table, model, record.path_mm[rows])
+            is_motion, noise_mm = _motion_in_fluctuations(table, model, path_mm[rows])
         exact = record.sigma_mm == 0.0 or is_motion
-        smooth = along_mm if exact else record.path_mm
+        smooth = along_mm if exact else path_mm
         low, high = range_mm
         reach = 1e-3 * (high - low)
         ahead, behind = (model.respond(smooth[rows] + way).gap_mm for way in (reach, -reach))
