@@ -144,6 +144,47 @@ def sharp_corners_mm(region: PlanarRegion) -> list[Array]:
     return found
 
 
+def rounded_corner(region: PlanarRegion, near_mm: Point, radius_mm: float) -> tuple[bool, Polygon]:
+    """Step that rounds a corner between two straight edges by a fillet: re-entrant corners are filled, others cut.
+
+    Parameters
+    ----------
+    region : PlanarRegion
+        The body.
+    near_mm : (float, float)
+        A point that is nearer to the corner than the radius.
+    radius_mm : float
+        Radius of the fillet, which touches both edges.
+
+    Raises
+    ------
+    DataError
+        There is no such corner, or an edge is too short for the radius.
+    """
+    found = [
+        (float(np.hypot(*(after.start_mm - near_mm))), before, after)
+        for loop in region.loops
+        for before, after in zip((loop.curves[-1], *loop.curves), loop.curves, strict=False)
+        if before.is_straight and after.is_straight
+    ]
+    apart, before, after = min(found, key=lambda each: each[0])
+    a, b = before.direction(np.zeros(1))[:, 0], after.direction(np.zeros(1))[:, 0]
+    x, y = after.start_mm.tolist()
+    turn = float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
+    if apart > radius_mm or abs(turn) < _SAME:
+        raise DataError(f"must be at a corner between two straight edges, but the nearest is at ({x:.6g}, {y:.6g}) mm.")
+    back = radius_mm * float(np.tan(0.5 * abs(turn)))
+    longest = min(float(np.hypot(*(c.end_mm - c.start_mm))) for c in (before, after))
+    if back > longest * (1.0 + _SAME):
+        raise DataError(
+            f"must leave the fillet {back:.4g} mm of both edges at the corner ({x:.6g}, {y:.6g}) mm, but one is "
+            f"{longest:.4g} mm long; the radius may be {radius_mm * longest / back:.4g} mm at most."
+        )
+    ends = [(x + s * back * d[0], y + s * back * d[1]) for s, d in ((1.0, b), (-1.0, a))]
+    corners = tuple((float(p[0]), float(p[1])) for p in ((x, y), *ends))
+    return turn < 0.0, Polygon(corners, (0.0, -float(np.tan(0.25 * turn)), 0.0))
+
+
 def _box_mm(curve: Curve) -> tuple[Array, Array]:
     """Lower and upper corner of the bounding box of a curve; for an arc, of the whole ellipse (mm)."""
     if curve.v is None:

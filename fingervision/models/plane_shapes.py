@@ -1,5 +1,6 @@
 """Plane shapes from which a body is composed: polygons and ellipses, each with its outline and its interior."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -18,6 +19,8 @@ _SAMPLES = 181
 """Samples along an arc at which crossings of two arcs are searched: crossings closer than 2 degrees are not
 separated."""
 _PARALLEL = 1e-12
+_STRAIGHT = 1e-9
+"""Bulge below which an arc counts as straight."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,21 +179,26 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Polygon:
-    """A straight-sided shape.
+    """A shape with straight sides, or sides that are arcs of circles.
 
     Parameters
     ----------
     corners_mm : tuple of (float, float)
         Corners in order, clockwise or anticlockwise.
+    bulges : tuple of float
+        For each corner, the tangent of a quarter of the angle of the arc from it to the next corner, positive for an
+        anticlockwise arc and 0 for a straight side, as in DXF; empty if all sides are straight.
     """
 
     corners_mm: tuple[Point, ...]
+    bulges: tuple[float, ...] = ()
 
     def curves(self) -> list[Curve]:
         """Sides of the polygon, as curves."""
         corners = np.array(self.corners_mm)
-        pairs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
-        return [Curve(a, b - a, None, 0.0, 1.0) for a, b in pairs if np.hypot(*(b - a)) > 0.0]
+        bulges = self.bulges or (0.0,) * len(corners)
+        sides = zip(corners, np.roll(corners, -1, axis=0), bulges, strict=True)
+        return [_arc(a, b, k) if k else Curve(a, b - a, None, 0.0, 1.0) for a, b, k in sides if np.hypot(*(b - a)) > 0]
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
         """Whether points, shape (2, n), lie inside: an odd number of the polygon's sides is then to their right."""
@@ -200,7 +208,53 @@ class Polygon:
         for (xa, ya), (xb, yb) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
             if ya != yb:
                 inside ^= ((ya > y) != (yb > y)) & (x < xa + (xb - xa) * (y - ya) / (yb - ya))
+        for arc in self.curves() if self.bulges else ():
+            if not arc.is_straight:  # the segment of the circle between the arc and its chord
+                (xa, ya), (xb, yb) = arc.start_mm, arc.end_mm
+                beside = (xb - xa) * (y - ya) - (yb - ya) * (x - xa)
+                inside ^= (arc.level(points) < 0.0) & (beside * (arc.t1 - arc.t0) < 0.0)
         return inside
+
+
+def _arc(a: Array, b: Array, bulge: float) -> Curve:
+    """Arc of a circle between two points, by its bulge."""
+    across = np.array([a[1] - b[1], b[0] - a[0]])
+    centre = 0.5 * (a + b) + across * (1.0 - bulge**2) / (4.0 * bulge)
+    radius = float(np.hypot(*(a - centre)))
+    t0 = float(np.arctan2(*(a - centre)[::-1]))
+    return Curve(centre, np.array([radius, 0.0]), np.array([0.0, radius]), t0, t0 + 4.0 * float(np.arctan(bulge)))
+
+
+def in_arcs(at: Callable[[Array], Array], t0: float, t1: float, within_mm: float) -> list[tuple[Point, float]]:
+    """Replace a curve by arcs of circles: the start of each arc and its bulge.
+
+    Each arc goes through the curve's points at both its ends and at the middle of the parameter, so that an arc of a
+    circle, given by its angle, is kept as it is.
+
+    Parameters
+    ----------
+    at : callable
+        Points of the curve, shape (2, n), at parameters, shape (n,).
+    t0, t1 : float
+        Parameters at the curve's start and end.
+    within_mm : float
+        Largest distance of the arcs from the curve.
+    """
+    points = at(np.linspace(t0, t1, 5)).T
+    a, middle, b = points[::2]
+    chord = b - a
+    length = float(np.hypot(*chord))
+    if not length and np.allclose(points, a):
+        return []
+    if length:
+        bulge = -2.0 * float(chord[0] * (middle - a)[1] - chord[1] * (middle - a)[0]) / length**2
+        bulge = 0.0 if abs(bulge) < _STRAIGHT else bulge
+        arc = _arc(a, b, bulge) if bulge else Curve(a, chord, None, 0.0, 1.0)
+        off = np.abs(arc.level(points[1:4].T)) * (0.5 * arc.u[0] if bulge else 1.0)
+        if abs(bulge) <= 1.0 + _WITHIN and float(off.max()) <= within_mm:
+            return [((float(a[0]), float(a[1])), bulge)]
+    half = 0.5 * (t0 + t1)
+    return in_arcs(at, t0, half, within_mm) + in_arcs(at, half, t1, within_mm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,9 +294,50 @@ class Ellipse:
 Shape = Polygon | Ellipse
 
 
-def crosses_itself(corners_mm: tuple[Point, ...]) -> bool:
+@dataclass(frozen=True, slots=True)
+class RigidMap:
+    """A motion of a drawing in its plane: an optional reflection in the line x = 0, a rotation, a translation.
+
+    Parameters
+    ----------
+    turn_deg : float
+        Angle of the rotation about the origin.
+    by_mm : (float, float)
+        The translation.
+    mirrored : bool
+        Whether x changes its sign before the rotation.
+    """
+
+    turn_deg: float = 0.0
+    by_mm: Point = (0.0, 0.0)
+    mirrored: bool = False
+
+    def point(self, point: Point) -> Point:
+        """Where a point goes."""
+        c, s = (_exact(f(np.radians(self.turn_deg))) for f in (np.cos, np.sin))
+        x, y = -point[0] if self.mirrored else point[0], point[1]
+        return c * x - s * y + self.by_mm[0], s * x + c * y + self.by_mm[1]
+
+    def angle_deg(self, angle_deg: float) -> float:
+        """Direction into which an axis with a direction turns."""
+        return self.turn_deg + (180.0 - angle_deg if self.mirrored else angle_deg)
+
+    def shape(self, shape: Shape) -> Shape:
+        """Where a shape goes."""
+        if isinstance(shape, Ellipse):
+            return Ellipse(self.point(shape.centre_mm), shape.half_axes_mm, self.angle_deg(shape.axis_deg))
+        bulges = tuple(-bulge for bulge in shape.bulges) if self.mirrored else shape.bulges
+        return Polygon(tuple(map(self.point, shape.corners_mm)), bulges)
+
+
+def _exact(share: float) -> float:
+    """Sine or cosine of a quarter turn without its rounding error, so that edges along x and y stay so."""
+    return float(np.round(share)) if abs(share - np.round(share)) < _PARALLEL else float(share)
+
+
+def crosses_itself(polygon: Polygon) -> bool:
     """Whether two non-adjacent sides of a polygon meet."""
-    sides = Polygon(corners_mm).curves()
+    sides = polygon.curves()
     count = len(sides)
     return any(
         crossings(sides[i], sides[j])

@@ -12,7 +12,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material, SNLine
 from fingervision.models.gripper_mechanism import check_outline, check_stated_size, redrawn, whole_mechanism
 from fingervision.models.mechanism import Mechanism, check_mechanism
-from fingervision.models.plane_shapes import crosses_itself
+from fingervision.models.plane_shapes import Polygon, crosses_itself
 from fingervision.storage.toml_section import DRAWINGS, Section, read_document, refuse_other_file
 
 _STATED = 1.05
@@ -164,7 +164,7 @@ def _check_links(gripper: Gripper, origin: str) -> None:
         )
     if len(set(links.tip_polygon_mm)) < len(links.tip_polygon_mm):
         raise DataError(f"links.tip_polygon_mm in {origin} must be different points, but one of them occurs twice.")
-    if crosses_itself(links.tip_polygon_mm):
+    if crosses_itself(Polygon(links.tip_polygon_mm)):
         raise DataError(
             f"links.tip_polygon_mm in {origin} must go round the tip without crossing itself, but two of its sides "
             "cross; put its points in order."

@@ -12,7 +12,8 @@ from fingervision.domain.field import Field, names_of
 from fingervision.domain.parameter import Estimate
 from fingervision.models.flexure import Flexure
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
-from fingervision.models.plane_shapes import Ellipse, Polygon, Shape, bar, box, crosses_itself
+from fingervision.models.planar_region import PlanarRegion, rounded_corner
+from fingervision.models.plane_shapes import Ellipse, Polygon, RigidMap, Shape, bar, box, crosses_itself
 from fingervision.models.strips import strips_of
 from fingervision.storage.drawing_numbers import bare_tables, changed_tables, number, numbers_of
 from fingervision.storage.gripper_toml import check_material, mechanism_from_gripper, read_material
@@ -27,6 +28,8 @@ _FLEXURES = {
 }
 """Sizes of each kind of flexure, beside its thickness."""
 _SHAPES = ("bar_mm", "box_mm", "disc_mm", "ellipse_mm", "polygon_mm")
+_QUARTER_DEG = 90.0
+_COPY = " copy"
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -47,6 +50,38 @@ class BodyTable:
         Field("ellipse: x, y, two half axes, and the angle of the first (degrees)", "mm"),
     ] = None
     polygon_mm: Annotated[tuple[Point, ...] | None, Field("polygon: its corners in order", "mm")] = None
+    bulges: Annotated[
+        tuple[float, ...],
+        Field(
+            "with a polygon: for each corner the arc to the next, as in DXF: tangent of a quarter of its angle, "
+            "positive for an anticlockwise arc, 0 for a straight side"
+        ),
+    ] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FilletTable:
+    """A table [[fillet]]."""
+
+    at_mm: Annotated[Point, Field("a corner between two straight edges of the bodies, or a point near it", "mm")]
+    radius_mm: Annotated[float, Field("radius that rounds the corner; a re-entrant corner is filled", "mm", above=0.0)]
+    name: Annotated[str, Field("name, for a copy")] = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CopyTable:
+    """A table [[copy]]: a reflection, then a rotation, then a translation of what it copies."""
+
+    of: Annotated[
+        tuple[str, ...],
+        Field("names of the bodies, fillets, flexures, fixed faces and probes; all of those above by default"),
+    ] = ()
+    suffix: Annotated[str, Field("what is added to the names of the copies; ` copy` by default")] = _COPY
+    mirror_x_mm: Annotated[float | None, Field("reflects them in the line x = this", "mm")] = None
+    mirror_y_mm: Annotated[float | None, Field("reflects them in the line y = this", "mm")] = None
+    turn_deg: Annotated[float, Field("rotates them from x towards y; by quarter turns with faces", "degrees")] = 0.0
+    about_mm: Annotated[Point, Field("centre of the rotation; the origin by default", "mm")] = (0.0, 0.0)
+    by_mm: Annotated[Point, Field("displaces them along x and y", "mm")] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,12 +185,14 @@ class MechanismFile:
     drive: Annotated[tuple[DriveTable, ...], Field("driven faces")]
     schema: Annotated[int, Field("1", low=1, high=1)] = 1
     name: Annotated[str | None, Field("name of the mechanism; that of its file by default")] = None
+    fillet: Annotated[tuple[FilletTable, ...], Field("rounded corners of the bodies, applied after all bodies")] = ()
     flexure: Annotated[tuple[FlexureTable, ...], Field("flexures")] = ()
     fixed: Annotated[tuple[FaceTable, ...], Field("fixed faces")] = ()
     slide: Annotated[tuple[SlideTable, ...], Field("faces that are held in one direction")] = ()
     probe: Annotated[tuple[ProbeTable, ...], Field("observed points")] = ()
     pair: Annotated[tuple[PairTable, ...], Field("pairs of points, each with a gap")] = ()
     contact: Annotated[tuple[ContactTable, ...], Field("faces that may touch each other, or a wall")] = ()
+    copy: Annotated[tuple[CopyTable, ...], Field("copies of parts of the drawing, in their order")] = ()
 
 
 def is_mechanism(path: Path) -> bool:
@@ -262,18 +299,22 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
 
     for key in ("flexure", "probe", "pair", "contact", "drive"):
         _refuse_same_names(top, key)
+    parts = _copied(top, file, _Parts(
+        [(body.name, each) for body, each in zip(file.body, each("body", _body), strict=True)],
+        each("flexure", _flexure), each("fixed", _face), {probe.name: probe.at_mm for probe in file.probe},
+    ))  # fmt: skip
     mechanism = Mechanism(
         name=origin if file.name is None else file.name,
         material=material,
         plate_mm=file.plate_mm,
-        bodies=tuple(each("body", _body)),
-        flexures=tuple(each("flexure", _flexure)),
-        fixed=tuple(each("fixed", _face)),
+        bodies=tuple(body for _, body in parts.bodies),
+        flexures=tuple(parts.flexures),
+        fixed=tuple(parts.fixed),
         slides=tuple(zip(each("slide", _face), [slide.holds for slide in file.slide], strict=True)),
         drives=tuple(each("drive", _drive)),
-        probes={probe.name: probe.at_mm for probe in file.probe},
+        probes=parts.probes,
         pairs={},
-        body_names=tuple(body.name for body in file.body),
+        body_names=tuple(name for name, _ in parts.bodies),
         contacts=tuple(each("contact", _contact)),
     )
     if not any(drive.per_input for drive in mechanism.drives):
@@ -307,6 +348,74 @@ def _refuse_same_names(top: Section, key: str) -> None:
         places[name] = place
 
 
+@dataclass(frozen=True, slots=True)
+class _Parts:
+    """What a [[copy]] copies: steps of bodies with their names, flexures, fixed faces and probes."""
+
+    bodies: list[tuple[str, tuple[bool, Shape]]]
+    flexures: list[Flexure]
+    fixed: list[Face]
+    probes: dict[str, Point]
+
+
+def _copied(top: Section, file: MechanismFile, parts: _Parts) -> _Parts:
+    """Add the fillets and the copies of a drawing to its parts."""
+    for section, fillet in zip(top.tables("fillet"), file.fillet, strict=True):
+        region = PlanarRegion(tuple(step for _, step in parts.bodies))
+        try:
+            parts.bodies.append((fillet.name, rounded_corner(region, fillet.at_mm, fillet.radius_mm)))
+        except DataError as error:
+            section.refuse("at_mm", str(error))
+    for section, table in zip(top.tables("copy"), file.copy, strict=True):
+        names = [
+            *(name for name, _ in parts.bodies),
+            *(f.name for f in parts.flexures),
+            *(f.name for f in parts.fixed),
+            *parts.probes,
+        ]
+        if missing := sorted(set(table.of) - set(names)):
+            section.refuse("of", f"must hold names of parts of the drawing, but there is no {missing[0]}.")
+        if table.of and not table.suffix:
+            section.refuse("suffix", "must not be empty, because a copy needs a name of its own.")
+        place = _map_of(section, table)
+        of = table.of or names
+        bodies = [(n and n + table.suffix, (add, place.shape(s))) for n, (add, s) in parts.bodies if n in of]
+        flexures = [
+            replace(f, name=f.name + table.suffix, at_mm=place.point(f.at_mm), axis_deg=place.angle_deg(f.axis_deg))
+            for f in parts.flexures if f.name in of
+        ]  # fmt: skip
+        fixed = [_moved(section, face, place, table.suffix) for face in parts.fixed if face.name in of]
+        probes = {name + table.suffix: place.point(at) for name, at in parts.probes.items() if name in of}
+        same = {f.name for f in parts.flexures} & {f.name for f in flexures} | parts.probes.keys() & probes.keys()
+        if same:
+            section.refuse("suffix", f"must give every copy a name of its own, but two parts are called {min(same)}.")
+        parts = _Parts(
+            parts.bodies + bodies, parts.flexures + flexures, parts.fixed + fixed, parts.probes | probes
+        )  # fmt: skip
+    return parts
+
+
+def _map_of(section: Section, table: CopyTable) -> RigidMap:
+    """Motion of a [[copy]]: reflection, then rotation about a point, then translation."""
+    x, y = table.mirror_x_mm, table.mirror_y_mm
+    if x is not None and y is not None:
+        section.refuse("mirror_y_mm", "must be left out beside mirror_x_mm; both together are turn_deg = 180.")
+    turn_deg = table.turn_deg + (180.0 if y is not None else 0.0)
+    turned = RigidMap(turn_deg, mirrored=x is not None or y is not None)
+    # A reflection in y = b is one in x = 0, half a turn, and a translation by 2 b.
+    first = RigidMap(table.turn_deg).point((2.0 * (x or 0.0) - table.about_mm[0], 2.0 * (y or 0.0) - table.about_mm[1]))
+    (cx, cy), (dx, dy) = table.about_mm, table.by_mm
+    return replace(turned, by_mm=(first[0] + cx + dx, first[1] + cy + dy))
+
+
+def _moved(section: Section, face: Face, place: RigidMap, suffix: str) -> Face:
+    if place.turn_deg % _QUARTER_DEG:
+        section.refuse("turn_deg", f"must be a multiple of 90, because {face.name} is a box along x and y.")
+    x0, x1, y0, y1 = face.box_mm
+    (xa, ya), (xb, yb) = place.point((x0, y0)), place.point((x1, y1))
+    return Face(face.name + suffix, (min(xa, xb), max(xa, xb), min(ya, yb), max(ya, yb)))
+
+
 def _body(section: Section, body: BodyTable, name: str) -> tuple[bool, Shape]:
     given = [key for key in _SHAPES if getattr(body, key) is not None]
     if len(given) != 1:
@@ -317,10 +426,18 @@ def _body(section: Section, body: BodyTable, name: str) -> tuple[bool, Shape]:
 def _shape(section: Section, body: BodyTable, key: str) -> Shape:
     if body.polygon_mm is not None:
         corners = body.polygon_mm
-        if len(corners) < 3 or len(set(corners)) < len(corners) or crosses_itself(corners):
+        if body.bulges and len(body.bulges) != len(corners):
+            section.refuse(
+                "bulges", f"must be {len(corners)} numbers, one for each corner, but are {len(body.bulges)}."
+            )
+        polygon = Polygon(corners, body.bulges if any(body.bulges) else ())
+        least = 2 if polygon.bulges else 3
+        if len(corners) < least or len(set(corners)) < len(corners) or crosses_itself(polygon):
             words = "must go round three points or more without crossing itself, but does not; put its points in order"
             section.refuse(key, f"{words}, each once.")
-        return Polygon(corners)
+        return polygon
+    if body.bulges:
+        section.refuse("bulges", f"must be left out beside {key}: only a polygon has arcs.")
     if body.bar_mm is not None:
         x0, y0, x1, y1 = body.bar_mm
         if (x0, y0) == (x1, y1):
