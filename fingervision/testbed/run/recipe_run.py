@@ -116,11 +116,16 @@ class Runner:
         for _ in range(FIRST_FRAMES - 1):
             watch.look()
         watch.find_fingers()
-        first = self._first_leg()
+        first, approach = self._first_leg()
         total_s, done_s = sum(self.plan.seconds), sum(self.plan.seconds[:first])
         foreseen_s = moved_s = ramps_s = 0.0
-        record.event("began", f"The plan has {len(self.plan.legs)} motion segments.")
-        self._rest(first)
+        recorded = record.counts.recorded
+        record.event("began", f"The plan has {len(self.plan.legs)} motion segments.", leg=first, frame=recorded)
+        self._rest(first if approach is None else approach)
+        if approach is not None:
+            watch.leg = self.plan.legs[approach]
+            record.event("approach", f"Step {watch.leg.step} once more: {watch.leg.words}.", step=watch.leg.step)
+            self._do(watch.leg, approach)
         for number, (leg, seconds) in enumerate(zip(self.plan.legs, self.plan.seconds, strict=True)):
             if number < first:
                 continue
@@ -165,14 +170,21 @@ class Runner:
             self.watch.say(f"warning: {words[:1].lower()}{words[1:]}")
             self.watch.record.event(event, words)
 
-    def _first_leg(self) -> int:
-        """Index of the first segment to execute: 0 with replay; without it, the segment that was interrupted."""
-        folder = self.watch.record.folder
+    def _first_leg(self) -> tuple[int, int | None]:
+        """Index of the first segment to execute, and of that which leads from the reference to its beginning, if any.
+
+        With replay, or in a new run, the first segment is 0. Otherwise, it is the segment of the first frame without a
+        row: rows are written some frames late, so that a killed program may have begun a later segment.
+        """
+        folder, legs = self.watch.record.folder, self.plan.legs
         if self.watch.bed.replays or not folder.resumed:
-            return 0
+            return 0, None
         self.watch.record.go_on((datetime.now(UTC) - folder.began_at).total_seconds())
-        legs = [event for event in folder.events_done if event["event"] == "leg"]
-        return int(legs[-1]["leg"]) if legs else 0
+        begun = [event for event in folder.events_done if "leg" in event and event["frame"] <= len(folder.rows)]
+        first = int(begun[-1]["leg"]) if begun else 0
+        # The stage stands at its reference, which is where it was re-zeroed. A sine ends where it begins.
+        before = [number for number in range(first) if isinstance(legs[number].act, Go | Close | Rezero)]
+        return first, before[-1] if before and not isinstance(legs[before[-1]].act, Rezero) else None
 
     def _do(self, leg: Leg, number: int) -> None:
         watch = self.watch

@@ -30,6 +30,11 @@ class Port(Protocol):
         """Wait for a line, or return what came of it within the time; 0 s returns what is there already."""
         ...
 
+    @property
+    def rest(self) -> bytes:
+        """What came without the end of a line."""
+        ...
+
     def close(self) -> None:
         """Release the port."""
         ...
@@ -40,7 +45,8 @@ class SerialPort:
 
     def __init__(self, name: str, baud: int, options: Mapping[str, Any]) -> None:
         self._port = serial.serial_for_url(name, baudrate=baud, timeout=0.0, write_timeout=1.0, **options)
-        self._rest = b""
+        self.rest = b""
+        """What came without the end of a line."""
 
     def write(self, data: bytes) -> object:
         """Send bytes."""
@@ -49,13 +55,13 @@ class SerialPort:
     def line(self, end: bytes, within_s: float) -> bytes:
         """Return the next line with its end, or an incomplete line when the time is over."""
         until_s = monotonic() + within_s
-        while end not in self._rest:
+        while end not in self.rest:
             self._port.timeout = max(0.0, min(0.05, until_s - monotonic()))
             got = self._port.read(max(1, self._port.in_waiting))
-            self._rest += got
+            self.rest += got
             if not got and monotonic() >= until_s:
                 return b""
-        line, _, self._rest = self._rest.partition(end)
+        line, _, self.rest = self.rest.partition(end)
         return line + end
 
     def close(self) -> None:
@@ -70,6 +76,8 @@ class SerialPort:
 
 class VisaPort:
     """A VISA resource such as `GPIB0::1::INSTR` or `TCPIP::192.168.1.5::INSTR`; needs the extra `visa`."""
+
+    rest = b""
 
     def __init__(self, name: str, baud: int | None) -> None:
         import pyvisa
@@ -221,11 +229,14 @@ class Line:
             if found is not None or exchange.done is None:
                 return found or seen
             awaited, found = exchange.done, seen
-        got = f"answered {', '.join(repr(each) for each in others[-3:])}" if others else "did not answer"
-        must = exchange.more.get("must", f"answer {said.strip()!r} by {exchange.reply and exchange.reply.pattern!r}")
+        got, rest = ", ".join(repr(each) for each in others[-3:]), self._port.rest.decode("latin-1")
+        but = f"answered {got}" if got else "did not answer"
+        if rest and not got:
+            but = f"sent {rest!r}, which does not end in {self._words.answer_end!r},"
+        must = exchange.more.get("must", f"answer {said.strip()!r} by '{exchange.reply and exchange.reply.pattern}'")
         raise DeviceError(
-            f"{self._words.name} must {must}, but {got} within {exchange.within_s:g} s: check its cable, its baud rate "
-            "and its words."
+            f"{self._words.name} must {must}, but {but} within {exchange.within_s:g} s: check its cable, its baud rate, "
+            "and in its words reply, line_end and answer_end."
         )
 
     def _heard(self, within_s: float) -> str:

@@ -1,6 +1,7 @@
 """Every row states where the stage truly was: where it starts and arrives, and the last ones before an interruption."""
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -59,11 +60,12 @@ def run(
     step_mm: float,
     controls: Controls,
     on_row: Callable[[object, object], None],
+    step: str = 'kind = "move"',
 ) -> None:
     path = CASES["grbl"].bed_at(folder, device, CAMERA.replace("rate_hz = 100.0", f"rate_hz = {RATE_HZ}"))
     text = path.read_text(encoding="utf-8").replace("settling_s", f"encoder_step_mm = {step_mm}\nsettling_s")
     path.write_text(text, encoding="utf-8")
-    recipe = read_recipe(recipe_at(folder, steps(f'kind = "move"\nto_mm = {to_mm}\nspeed_mm_s = 0.5')))
+    recipe = read_recipe(recipe_at(folder, steps(f"{step}\nto_mm = {to_mm}\nspeed_mm_s = 0.5")))
     bed = open_bed(str(path))
     try:
         run_recipe(recipe, bed, folder / "run", controls=controls, on_row=on_row)
@@ -100,3 +102,31 @@ def test_the_last_rows_before_an_interruption_are_where_the_stage_was(
     with pytest.raises(StateError):
         run(device, tmp_path, 2.0, step_mm, controls, interrupt)
     assert_true(read_samples(tmp_path / "run" / "samples.csv")[-6:], device.plant)
+
+
+@pytest.mark.parametrize(("from_mm", "unwritten"), [(0.0, 0), (0.2, 12)])
+def test_an_interrupted_motion_is_repeated_from_where_it_began(
+    from_mm: float, unwritten: int, device: Grbl, tmp_path: Path
+) -> None:
+    controls, seen = Controls(), []
+
+    def interrupt(row: SampleRow, picture: object) -> None:
+        seen.append(row.input_mm or 0.0)
+        if len(seen) > 3 and 0.4 < seen[-1] < seen[-2]:  # on the way back
+            controls.stop()
+
+    step = f'kind = "triangle"\nfrom_mm = {from_mm}'
+    with pytest.raises(StateError):
+        run(device, tmp_path, 0.6, 0.0, controls, interrupt, step)
+    table = tmp_path / "run" / "samples.csv"
+    lines = table.read_bytes().splitlines(keepends=True)
+    table.write_bytes(b"".join(lines[: len(lines) - unwritten]))  # as a killed program leaves it
+    run(device, tmp_path, 0.6, 0.0, Controls(), lambda row, picture: None, step)
+    rows = read_samples(table)
+    assert_true(rows, device.plant)
+    again = [row.input_mm for row in rows if row.run == "2" and row.input_mm is not None]
+    turn = again.index(max(again))
+    assert max(again) == pytest.approx(0.6, abs=0.005)
+    for way in (again[: turn + 1], again[turn:][::-1]):  # every frame of both ways, at 0.02 mm each
+        assert max(b - a for a, b in pairwise(way)) < 0.03
+    assert again[-1] == pytest.approx(from_mm, abs=0.005)

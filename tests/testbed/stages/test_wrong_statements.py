@@ -188,6 +188,8 @@ def test_a_record_that_limits_its_speed_is_not_moved() -> None:
 class LatePort:
     """Answers the first question only after the second was asked, and then both."""
 
+    rest = b""
+
     def __init__(self) -> None:
         self.asked, self.answers = 0, list[bytes]()
 
@@ -209,6 +211,11 @@ def test_a_late_answer_is_not_taken_for_that_to_the_next_question() -> None:
     line = Line(LatePort(), Words("late", 9600, {}, "\n", 0.0, None, {}, (), {}))
     line.ask(question)
     assert number_in(line.ask(question), "late") == 3.0
+
+
+def test_an_answer_without_the_stated_end_of_a_line_is_told(device: Invented, tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match=r"INVENTED STAGE 1\.0\\n.* '\\r'"):
+        opened(EXAMPLE.replace('answer_end = "\\n"', 'answer_end = "\\r"'), device, tmp_path)
 
 
 def test_a_refusal_says_what_was_said_and_answered(device: Invented, tmp_path: Path) -> None:
