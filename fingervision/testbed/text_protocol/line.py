@@ -235,7 +235,7 @@ class Line:
             but = f"sent {rest!r}, which does not end in {self._words.answer_end!r},"
         must = exchange.more.get("must", f"answer {said.strip()!r} by '{exchange.reply and exchange.reply.pattern}'")
         raise DeviceError(
-            f"{self._words.name} must {must}, but {but} within {exchange.within_s:g} s: check its cable, its baud rate, "
+            f"{self._words.name} must {must}, but {but} within {exchange.within_s:g} s: check its cable, baud rate, "
             "and in its words reply, line_end and answer_end."
         )
 
