@@ -32,11 +32,12 @@ Examples:
   fingervision model mechanism.toml --vary lengths.t=0.2:0.4:5
   fingervision model gripper.toml --solve lever.l2_mm=16:20 --for gap_per_input=8
   fingervision model mechanism.toml --large-rotation --mesh --out stage
+  fingervision model gripper.toml --export gripper.svg --export gripper.stl
 """
 
 
 @make_command(_EPILOG)
-@click.argument("gripper_toml", metavar="DRAWING.toml", type=FILE)
+@click.argument("gripper_toml", metavar="DRAWING", type=FILE)
 @option(
     "--kind",
     type=KindName("all"),
@@ -137,6 +138,14 @@ Examples:
     help="Rows per second of response.csv, in addition to the drive's own samples.",
 )
 @out_option("model")
+@option(
+    "--export",
+    multiple=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    group=OUTPUT,
+    help="Write the outline as .dxf or .svg, or the plate as .stl (mm), and compute nothing (repeatable).",
+)
 @option("--mesh", is_flag=True, group=OUTPUT, help="Write a picture of the finite-element mesh, mesh.png.")
 @json_option("Print the table as JSON.")
 def command(
@@ -155,6 +164,7 @@ def command(
     rate_hz: float | None,
     object_mm: float | None,
     object_n_mm: float | None,
+    export: tuple[Path, ...],
     mesh: bool,
     vary: tuple[str, ...],
     solve: tuple[str, ...],
@@ -167,6 +177,8 @@ def command(
     input, with differences between the models) and deformed.png (with finite elements). With --drive, it also writes
     response.csv (gap and force over the drive's time, a table that compare and diagnose accept as measured) and
     response.png. For a mechanism.toml, the results over the input are in mechanism.csv.
+
+    From the outline of a DXF or SVG file, the command begins a mechanism.toml, with the lines that are to be completed.
     """
     import json
 
@@ -185,6 +197,14 @@ def command(
     from fingervision.tables.read import read_drive
 
     asked = motion_asked(drive, columns, modes, frequency, damping, rate_hz, film=film)
+    if export or gripper_toml.suffix.lower() in (".dxf", ".svg"):
+        from fingervision.cli import _outline
+
+        if export:
+            _outline.export(gripper_toml, export)
+        else:
+            _outline.begin_drawing(gripper_toml, results_folder(out, gripper_toml))
+        return
     out = results_folder(out, gripper_toml)
     began_ns = began_in(out)
     if is_mechanism(gripper_toml):

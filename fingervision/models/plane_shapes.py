@@ -169,9 +169,18 @@ def _meetings(curve: Curve, other: Curve) -> list[float]:
         return []
     found = [float(t[i]) for i in np.flatnonzero(level == 0.0)]
     turns = np.flatnonzero(level[1:] * level[:-1] < 0.0).tolist()
-    return found + [
-        float(brentq(lambda s: float(other.level(curve.at(np.array([s])))[0]), t[i], t[i + 1])) for i in turns
-    ]
+    return found + [_meeting(curve, other, float(t[i]), float(t[i + 1])) for i in turns]
+
+
+def _meeting(curve: Curve, other: Curve, a: float, b: float) -> float:
+    """Parameter between two others at which a curve crosses another curve; one of both if rounding hides the change."""
+
+    def level(t: float) -> float:
+        return float(other.level(curve.at(np.array([t])))[0])
+
+    if level(a) * level(b) > 0.0:
+        return min(a, b, key=lambda t: abs(level(t)))
+    return float(brentq(level, a, b))
 
 
 Point = tuple[float, float]

@@ -26,6 +26,8 @@ _SLENDER = 2.0
 _PARALLEL = 1e-6
 """Largest sine of the angle between the sides of a strip."""
 _SAMPLES = 33
+_SAME = 1e-3
+"""Distance along a side, as a share of its length, below which its end is the end of the strip."""
 _TANGENT = 1e-3
 """Largest sine of the angle at which a fillet's arc meets the strip's side."""
 _BEYOND = 1.0
@@ -89,29 +91,35 @@ def _strip(
     inside = [origin[:, None] + np.outer(way, along) + y * thickness * normal[:, None] for y in (-0.49, 0.0, 0.49)]
     if not region.holds(np.concatenate(inside, axis=1)).all():
         return None
-    fillet = min(_fillet_mm(*first, thickness), _fillet_mm(*second, thickness))
+    fillets = []
     for end, sign in ((low, -1.0), (high, 1.0)):
-        at = origin + (end + sign * (fillet + _BEYOND * thickness)) * way
+        radii = [_fillet_mm(*side, origin + end * way) for side in (first, second)]
+        fillets.append(min(radii))
+        reach = max(radius for radius in radii if np.isfinite(radius))
+        at = origin + (end + sign * (reach + _BEYOND * thickness)) * way
         if _width_mm(region, at, normal, thickness) < _THINNER * thickness:
             return None
+    fillet = min(fillets) if max(fillets) <= _MAX_FILLET * thickness else 0.0
     x, y = origin + 0.5 * (low + high) * way
     axis_deg = float(np.degrees(np.arctan2(way[1], way[0])))
     half = 0.5 * (high - low) + fillet
     return Flexure("", "strip", (float(x), float(y)), axis_deg, thickness, half, fillet, fillet)
 
 
-def _fillet_mm(curves: tuple[Curve, ...], place: int, thickness: float) -> float:
-    """Smaller radius of the arcs that continue a side at both ends; 0 where a corner is sharp."""
-    side, radii = curves[place], []
-    for other, own, theirs in ((curves[place - 1], side.t0, "t1"), (curves[(place + 1) % len(curves)], side.t1, "t0")):
-        if other.is_straight:
-            return 0.0
-        at = np.array([getattr(other, theirs)])
-        a, b = side.direction(np.array([own]))[:, 0], other.direction(at)[:, 0]
-        if abs(a[0] * b[1] - a[1] * b[0]) > _TANGENT:
-            return 0.0
-        radii.append(float(other.curvature_radius_mm(at)[0]))
-    return min(radii) if max(radii) <= _MAX_FILLET * thickness else 0.0
+def _fillet_mm(curves: tuple[Curve, ...], place: int, end_mm: Array) -> float:
+    """Radius of the arc that continues a side at one end of a strip: 0 at a sharp corner, infinite where it goes on."""
+    side = curves[place]
+    before, after = curves[place - 1], curves[(place + 1) % len(curves)]
+    starts = np.hypot(*(side.start_mm - end_mm)) < np.hypot(*(side.end_mm - end_mm))
+    other, own, theirs = (before, side.t0, before.t1) if starts else (after, side.t1, after.t0)
+    way = side.direction(np.array([own]))[:, 0]
+    if abs(way @ (side.at(np.array([own]))[:, 0] - end_mm)) > _SAME * np.hypot(*(side.end_mm - side.start_mm)):
+        return np.inf
+    at = np.array([theirs])
+    next_way = other.direction(at)[:, 0]
+    if abs(way[0] * next_way[1] - way[1] * next_way[0]) > _TANGENT:
+        return 0.0
+    return float(other.curvature_radius_mm(at)[0])
 
 
 def _width_mm(region: PlanarRegion, at: Array, normal: Array, thickness: float) -> float:

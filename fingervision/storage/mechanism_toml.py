@@ -17,6 +17,7 @@ from fingervision.models.plane_shapes import Ellipse, Polygon, RigidMap, Shape, 
 from fingervision.models.strips import strips_of
 from fingervision.storage.drawing_numbers import bare_tables, changed_tables, number, numbers_of
 from fingervision.storage.gripper_toml import check_material, mechanism_from_gripper, read_material
+from fingervision.storage.outline_file import read_outline
 from fingervision.storage.plain_file import toml_of
 from fingervision.storage.toml_section import DRAWINGS, Section, read_document, refuse_other_file
 
@@ -27,7 +28,7 @@ _FLEXURES = {
     "leaf": ("half_length_mm",),
 }
 """Sizes of each kind of flexure, beside its thickness."""
-_SHAPES = ("bar_mm", "box_mm", "disc_mm", "ellipse_mm", "polygon_mm")
+_SHAPES = ("bar_mm", "box_mm", "disc_mm", "ellipse_mm", "polygon_mm", "outline")
 _QUARTER_DEG = 90.0
 _COPY = " copy"
 
@@ -57,6 +58,13 @@ class BodyTable:
             "positive for an anticlockwise arc, 0 for a straight side"
         ),
     ] = ()
+    outline: Annotated[
+        str, Field("closed outlines of a DXF or SVG file, whose path is relative to the drawing; inner ones are holes")
+    ] = ""
+    layer: Annotated[str, Field("layer of the DXF file; all visible ones by default")] = ""
+    unit_mm: Annotated[
+        float | None, Field("unit of the file's lengths; as the file states by default, or mm in DXF", "mm", above=0.0)
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,7 +308,7 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
     for key in ("flexure", "probe", "pair", "contact", "drive"):
         _refuse_same_names(top, key)
     parts = _copied(top, file, _Parts(
-        [(body.name, each) for body, each in zip(file.body, each("body", _body), strict=True)],
+        [named for steps in each("body", _body) for named in steps],
         each("flexure", _flexure), each("fixed", _face), {probe.name: probe.at_mm for probe in file.probe},
     ))  # fmt: skip
     mechanism = Mechanism(
@@ -416,11 +424,15 @@ def _moved(section: Section, face: Face, place: RigidMap, suffix: str) -> Face:
     return Face(face.name + suffix, (min(xa, xb), max(xa, xb), min(ya, yb), max(ya, yb)))
 
 
-def _body(section: Section, body: BodyTable, name: str) -> tuple[bool, Shape]:
-    given = [key for key in _SHAPES if getattr(body, key) is not None]
+def _body(section: Section, body: BodyTable, name: str) -> list[tuple[str, tuple[bool, Shape]]]:
+    """Steps of a body, each with its name: one shape, or the outlines of a file, of which holes have no name."""
+    given = [key for key in _SHAPES if getattr(body, key)]
     if len(given) != 1:
         section.refuse(None, f"must have exactly one of {', '.join(_SHAPES)}, but has {' and '.join(given) or 'none'}.")
-    return not body.cut, _shape(section, body, given[0])
+    if not body.outline:
+        return [(body.name, (not body.cut, _shape(section, body, given[0])))]
+    shapes = read_outline(section.path.parent / body.outline, body.layer, body.unit_mm)
+    return [(body.name if added else "", (added != body.cut, shape)) for added, shape in shapes]
 
 
 def _shape(section: Section, body: BodyTable, key: str) -> Shape:

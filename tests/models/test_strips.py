@@ -88,6 +88,27 @@ def test_fillets_belong_to_a_strip_and_thick_bars_are_none(tmp_path: Path) -> No
     assert not drawn(tmp_path, thick).strips
 
 
+def test_a_strip_at_the_edge_has_fillets_on_one_side(tmp_path: Path) -> None:
+    """A window with rounded corners leaves a leaf on either side; the outer sides of the leaves go on straight."""
+    window = """
+[[body]]
+box_mm = [0, 40, 0, 10]
+[[body]]
+cut = true
+polygon_mm = [[11, 0.6], [29, 0.6], [30, 1.6], [30, 8.4], [29, 9.4], [11, 9.4], [10, 8.4], [10, 1.6]]
+bulges = [0, 0.41421356, 0, 0.41421356, 0, 0.41421356, 0, 0.41421356]
+"""
+    mechanism = drawn(tmp_path, window)
+    assert [(*s.at_mm, s.thickness_mm, s.fillet_mm) for s in mechanism.strips] == [
+        pytest.approx((20.0, y, 0.6, 1.0), abs=1e-6) for y in (0.3, 9.7)
+    ]
+    ours, theirs = MechanismFrame(mechanism), MechanismPlate(mechanism)
+    assert ours.stiffness_n_mm == pytest.approx(theirs.stiffness_n_mm, rel=ours.force_error)
+    stress = theirs.state(1.0).stress_mpa
+    assert ours.state(1.0).stress_mpa == pytest.approx(stress, rel=ours.stress_error)
+    assert MechanismPlate(mechanism, refine=1.6).state(1.0).stress_mpa == pytest.approx(stress, rel=0.01)
+
+
 def test_an_accidental_neck_is_found_at_its_place(tmp_path: Path) -> None:
     hole = (
         NAMED

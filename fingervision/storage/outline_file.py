@@ -1,0 +1,286 @@
+"""Outlines from DXF and SVG drawings, and outlines and solids for cutters and printers (DXF, SVG, STL).
+
+Libraries: ezdxf (https://ezdxf.mozman.at) for DXF, svgelements (https://github.com/meerk40t/svgelements) for reading
+SVG. Arcs of circles stay arcs; ellipses, splines and Bezier curves become arcs within 1 micrometre.
+"""
+
+import importlib
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingervision.domain.errors import DataError, InputFileError, MissingLibraryError, UsageError
+from fingervision.models.mechanism import Mechanism
+from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.plane_shapes import Curve, Point, Polygon, in_arcs
+from fingervision.models.triangulate import triangulate
+
+Array = NDArray[np.float64]
+Vertex = tuple[Point, float]
+"""A corner and the bulge of the side that begins there."""
+Chain = tuple[list[Vertex], Point]
+"""Vertices, and the point at which the last side ends."""
+
+OUTLINES = (".dxf", ".svg")
+"""Endings of the files that are read."""
+EXPORTS = (*OUTLINES, ".stl")
+"""Endings of the files that are written."""
+_WITHIN_MM = 1e-3
+"""Largest distance of the arcs that replace other curves."""
+_JOINED = 1e-5
+"""Distance below which two ends of lines meet, as a share of the drawing's size: CAD programs round to 6 digits."""
+_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72.0, "pc": 25.4 / 6.0}
+_ACROSS, _BODY = 4.0, 0.025
+"""Triangles of a solid across thin parts, and their size over the body's size."""
+
+
+def read_outline(path: Path, layer: str = "", unit_mm: float | None = None) -> tuple[tuple[bool, Polygon], ...]:
+    """Read the closed outlines of a drawing, as shapes that are added (the body) or removed (its holes), in order.
+
+    Parameters
+    ----------
+    path : Path
+        A DXF file, of which lines, arcs, circles, ellipses, splines and polylines are read, or an SVG file, with y
+        upwards from the lower edge of its page.
+    layer : str
+        Layer of the DXF file that is read; all that are visible by default.
+    unit_mm : float or None
+        Length of the file's unit in mm; None takes the unit that the file states (a DXF file without one is in mm).
+
+    Raises
+    ------
+    DataError, InputFileError, MissingLibraryError
+        The file cannot be read, states no unit (SVG), or its lines do not form closed outlines.
+    """
+    if not path.is_file():
+        raise InputFileError(f"There is no drawing {path}.")
+    read = {".dxf": _dxf_chains, ".svg": _svg_chains}.get(path.suffix.lower())
+    if read is None:
+        raise DataError(f"An outline must be a {' or '.join(OUTLINES)} file, but is {path}.")
+    chains = [chain for chain in read(path, layer, unit_mm) if chain[0]]
+    if not chains:
+        of = f" on layer {layer}" if layer else ""
+        raise DataError(f"{path} must hold lines or curves{of}, but holds none.")
+    loops = sorted(_closed(chains, path), key=lambda loop: -abs(_area(loop)))
+    # A loop inside an odd number of others is a hole.
+    depth = [sum(outer.holds(_inside(loop))[0] for outer in loops[:place]) for place, loop in enumerate(loops)]
+    return tuple((deep % 2 == 0, loop) for deep, loop in zip(depth, loops, strict=True))
+
+
+def _library(name: str, path: Path) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise MissingLibraryError(name, "outlines", f"{path} is a drawing, which") from error
+
+
+def _dxf_chains(path: Path, layer: str, unit_mm: float | None) -> Iterator[Chain]:
+    ezdxf = _library("ezdxf", path)
+    try:
+        document = ezdxf.readfile(path)
+    except (OSError, ezdxf.DXFError, UnicodeDecodeError) as error:
+        raise DataError(f"{path} must be a DXF drawing, but could not be read: {error}.") from error
+    if unit_mm is None:
+        unit_mm = ezdxf.units.conversion_factor(document.units, 4) if document.units else 1.0
+    layers = {each.dxf.name.lower(): each.is_on() and not each.is_frozen() for each in document.layers}
+    if layer and layer.lower() not in layers:
+        raise DataError(f"{path} must have the layer {layer}, but has {', '.join(sorted(layers))}.")
+    for entity in document.modelspace():
+        own = entity.dxf.layer.lower()
+        if own == layer.lower() if layer else layers.get(own, True):
+            yield from _entity_chains(entity, unit_mm)
+
+
+def _entity_chains(entity: Any, unit_mm: float) -> Iterator[Chain]:
+    kind = entity.dxftype()
+
+    def at(t: Array) -> Array:
+        points = entity.construction_tool().points(t) if kind == "SPLINE" else entity.vertices(t)
+        return unit_mm * np.array([[p.x, p.y] for p in points]).T
+
+    if kind == "LINE":
+        yield _chain(lambda t: unit_mm * np.array([entity.dxf.start, entity.dxf.end])[t.astype(int), :2].T, [0.0, 1.0])
+    elif kind == "ARC":
+        first, last = entity.dxf.start_angle, entity.dxf.end_angle
+        yield _chain(at, np.linspace(first, first + ((last - first) % 360.0 or 360.0), 3))
+    elif kind == "CIRCLE":
+        yield _chain(at, np.linspace(0.0, 360.0, 3))
+    elif kind == "ELLIPSE":
+        first, last = entity.dxf.start_param, entity.dxf.end_param
+        yield _chain(at, np.linspace(first, first + ((last - first) % (2.0 * np.pi) or 2.0 * np.pi), 3))
+    elif kind == "SPLINE":
+        yield _chain(at, np.unique(np.clip(entity.construction_tool().knots(), 0.0, entity.construction_tool().max_t)))
+    elif kind in ("LWPOLYLINE", "POLYLINE", "INSERT"):
+        for part in entity.virtual_entities():
+            yield from _entity_chains(part, unit_mm)
+
+
+def _svg_chains(path: Path, layer: str, unit_mm: float | None) -> Iterator[Chain]:
+    svgelements = _library("svgelements", path)
+    if layer:
+        raise DataError(f"{path} is an SVG drawing, which has no layers: leave out layer = {layer!r}.")
+    try:
+        page = svgelements.SVG.parse(str(path))
+    except (OSError, SyntaxError, ValueError) as error:
+        raise DataError(f"{path} must be an SVG drawing, but could not be read: {error}.") from error
+    stated = re.fullmatch(rf"\s*([\d.eE+-]+)\s*({'|'.join(_MM)})\s*", str(page.values.get("width", "")))
+    if unit_mm is not None:
+        mm = unit_mm * (page.viewbox.width / page.width if page.viewbox is not None else 1.0)
+    elif stated is not None:
+        mm = float(stated[1]) * _MM[stated[2]] / page.width
+    else:
+        raise DataError(f"The page of {path} must have a width in mm, cm or in, but has none: state unit_mm.")
+    for element in page.elements():
+        if isinstance(element, svgelements.Shape):
+            outline = svgelements.Path(element)
+            outline.reify()
+            for part in outline:
+                if not isinstance(part, svgelements.Move) and part.start != part.end:
+                    yield _chain(_svg_points(part, mm, page.height), [0.0, 0.5, 1.0])
+
+
+def _svg_points(part: Any, mm: float, height: float) -> Callable[[Array], Array]:
+    return lambda t: mm * np.array([[p.x, height - p.y] for p in map(part.point, t.tolist())]).T
+
+
+def _chain(at: Callable[[Array], Array], stops: Sequence[float] | Array) -> Chain:
+    """Replace a curve, piece by piece between its stops, by arcs."""
+    vertices = [vertex for a, b in pairwise(stops) for vertex in in_arcs(at, a, b, _WITHIN_MM)]
+    end = at(np.array([stops[-1]]))[:, 0]
+    return vertices, (float(end[0]), float(end[1]))
+
+
+def _closed(chains: list[Chain], path: Path) -> list[Polygon]:
+    """Join chains of which one ends where the next begins, in either direction, to closed polygons."""
+    points = np.array([at for vertices, end in chains for at in (*(v[0] for v in vertices), end)])
+    same_mm = _JOINED * float(np.hypot(*np.ptp(points, axis=0)))
+    ends = np.array([(vertices[0][0], end) for vertices, end in chains])
+    left, loops = set(range(len(chains))), []
+    while left:
+        vertices, end = chains[first := left.pop()]
+        vertices = list(vertices)
+        while np.hypot(*np.subtract(end, ends[first, 0])) > same_mm:
+            near = [(n, side) for n in left for side in (0, 1) if np.hypot(*(ends[n, side] - end)) <= same_mm]
+            if len(near) != 1:
+                what = "ends" if not near else "branches"
+                raise DataError(
+                    f"Lines of {path} must form closed outlines, but one {what} at ({end[0]:.6g}, {end[1]:.6g}) mm; "
+                    "join it there, or put construction lines on another layer and state the layer of the outline."
+                )
+            n, side = near[0]
+            left.discard(n)
+            more, end = chains[n] if side == 0 else _reversed(chains[n])
+            vertices += more
+        loops.append(_simplified(vertices))
+    return loops
+
+
+def _reversed(chain: Chain) -> Chain:
+    vertices, end = chain
+    starts = [end, *(at for at, _ in reversed(vertices))]
+    return [(at, -bulge) for at, (_, bulge) in zip(starts, reversed(vertices), strict=False)], vertices[0][0]
+
+
+def _simplified(vertices: list[Vertex]) -> Polygon:
+    """Polygon without the corners between two straight sides in line, which would divide the sides of a strip."""
+    kept = []
+    for place, (at, bulge) in enumerate(vertices):
+        (before, bulge_before), (after, _) = vertices[place - 1], vertices[(place + 1) % len(vertices)]
+        (ax, ay), (bx, by) = np.subtract(at, before), np.subtract(after, at)
+        in_line = abs(ax * by - ay * bx) <= _JOINED * abs(ax * bx + ay * by) and ax * bx + ay * by > 0.0
+        if bulge or bulge_before or not in_line:
+            kept.append((at, bulge))
+    return Polygon(tuple(at for at, _ in kept), tuple(bulge for _, bulge in kept))
+
+
+def _area(polygon: Polygon) -> float:
+    x, y = _chords(polygon.curves())
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+def _inside(polygon: Polygon) -> Array:
+    """A point of the outline, which lies inside every loop around it; shape (2, 1)."""
+    curve = polygon.curves()[0]
+    return curve.at(np.array([0.5 * (curve.t0 + curve.t1)]))
+
+
+def _chords(curves: Iterable[Curve]) -> Array:
+    return np.concatenate([c.at(np.linspace(c.t0, c.t1, 2 if c.is_straight else 17))[:, :-1] for c in curves], axis=1)
+
+
+def write_outline(path: Path, mechanism: Mechanism) -> str:
+    """Write the outline of a mechanism as DXF or SVG, or its plate as STL; lengths are in mm. Return what was written.
+
+    Raises
+    ------
+    MissingLibraryError, UsageError
+        A library is not installed, or the file's ending is another one.
+    """
+    region, kind = PlanarRegion(mechanism.region.steps), path.suffix.lower()
+    if kind not in EXPORTS:
+        raise UsageError(f"--export must name a {', '.join(EXPORTS)} file, but names {path}.")
+    if kind == ".stl":
+        count = _write_stl(path, region, mechanism.plate_mm)
+        return f"{path}: {count} triangles, {mechanism.plate_mm:g} mm thick"
+    loops = [[vertex for curve in loop.curves for vertex in _arcs_of(curve)] for loop in region.loops]
+    points = _chords(curve for loop in region.loops for curve in loop.curves)
+    low, high = points.min(axis=1), points.max(axis=1)
+    if kind == ".svg":
+        path.write_text(_svg(loops, low, high), encoding="utf-8")
+    else:
+        document = _library("ezdxf", path).new(units=4)
+        for vertices in loops:
+            document.modelspace().add_lwpolyline([(*at, bulge) for at, bulge in vertices], format="xyb", close=True)
+        document.saveas(path)
+    wide, tall = high - low
+    return f"{path}: {len(loops)} closed outlines, {wide:.6g} by {tall:.6g} mm"
+
+
+def _arcs_of(curve: Curve) -> list[Vertex]:
+    return _chain(curve.at, np.linspace(curve.t0, curve.t1, 2 if curve.is_straight else 3))[0]
+
+
+def _svg(loops: Iterable[list[Vertex]], low: Array, high: Array) -> str:
+    """Text of an SVG drawing in mm, with the lower left corner of the outline at that of the page."""
+    (left, top), (wide, tall) = (low[0], high[1]), high - low
+    words = []
+    for vertices in loops:
+        (x, y), _ = vertices[0]
+        words.append(f"M{x - left:.6f} {top - y:.6f}")
+        for (start, bulge), (end, _) in zip(vertices, [*vertices[1:], vertices[0]], strict=True):
+            to = f"{end[0] - left:.6f} {top - end[1]:.6f}"
+            radius = np.hypot(*np.subtract(end, start)) * (1.0 + bulge**2) / (4.0 * abs(bulge)) if bulge else 0.0
+            words.append(f"A{radius:.6f} {radius:.6f} 0 0 {int(bulge < 0.0)} {to}" if bulge else f"L{to}")
+        words.append("Z")
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide:.6f}mm" height="{tall:.6f}mm" '
+        f'viewBox="0 0 {wide:.6f} {tall:.6f}">\n<path d="{" ".join(words)}" fill="none" stroke="black" '
+        'stroke-width="0.1"/>\n</svg>\n'
+    )
+
+
+def _write_stl(path: Path, region: PlanarRegion, plate_mm: float) -> int:
+    """Write the plate as a closed surface of flat triangles (binary STL); return their number."""
+    mesh = triangulate(region, _ACROSS, _BODY * region.size_mm)
+    a, b, c, ab, bc, ac = mesh.triangles
+    flat = np.concatenate([[a, ab, ac], [ab, b, bc], [ac, bc, c], [ab, bc, ac]], axis=1)
+    edges = np.concatenate([flat[[0, 1]], flat[[1, 2]], flat[[2, 0]]], axis=1)
+    # An edge of the outline belongs to one triangle only.
+    known = set(zip(*edges.tolist(), strict=True))
+    p, q = np.array([(i, j) for i, j in known if (j, i) not in known]).T
+    low = np.vstack([mesh.nodes_mm, np.zeros(mesh.nodes_mm.shape[1])]).T
+    high = low + np.array([0.0, 0.0, plate_mm])
+    faces = [low[flat[::-1]], high[flat], np.stack([low[p], low[q], high[q]]), np.stack([low[p], high[q], high[p]])]
+    corners = np.concatenate(faces, axis=1).transpose(1, 0, 2)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    record = np.zeros(len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("none", "<u2")])
+    record["normal"] = normals / np.linalg.norm(normals, axis=1)[:, None]
+    record["corners"] = corners
+    header = b"fingervision, mm".ljust(80) + np.uint32(len(record)).tobytes()
+    path.write_bytes(header + record.tobytes())
+    return len(record)
