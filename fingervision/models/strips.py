@@ -95,7 +95,7 @@ def _strip(
     for end, sign in ((low, -1.0), (high, 1.0)):
         radii = [_fillet_mm(*side, origin + end * way) for side in (first, second)]
         fillets.append(min(radii))
-        reach = max(radius for radius in radii if np.isfinite(radius))
+        reach = max((radius for radius in radii if np.isfinite(radius)), default=0.0)
         at = origin + (end + sign * (reach + _BEYOND * thickness)) * way
         if _width_mm(region, at, normal, thickness) < _THINNER * thickness:
             return None

@@ -126,6 +126,12 @@ disc_mm = [32, 7, 2.5]
     assert not strips_of(mechanism.region, mechanism.flexures)
 
 
+def test_sides_that_the_box_of_a_face_divides_are_no_strip(tmp_path: Path) -> None:
+    """The box of a face that crosses a bar puts a corner on both its sides, beyond which the bar goes on."""
+    bar = '[[body]]\nbox_mm = [0, 40, 0, 2]\n[[slide]]\nbox_mm = [18, 22, -1, 3]\nholds = "x"\n'
+    assert not drawn(tmp_path, bar).strips
+
+
 @pytest.mark.slow
 def test_the_command_says_what_it_took_for_a_flexure(tmp_path: Path) -> None:
     drawn(tmp_path, CUT)
