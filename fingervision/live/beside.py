@@ -1,18 +1,18 @@
 """Additional parts of a live measurement: a test bed, a log of the drive, a model, gauges."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fingervision.domain.errors import DataError
 from fingervision.frames.source import Driven
-from fingervision.live.bed.bench import Bench
-from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.live_gauges import put_live_gauges
 from fingervision.live.session import Session
+from fingervision.live.view import View
 from fingervision.motion.drive_at import drive_at
-from fingervision.storage.out_folder import make_out_folder
-from fingervision.tables.read import read_drive
-from fingervision.testbed.run.run_folder import SIMULATION, write_expected
+
+if TYPE_CHECKING:
+    from fingervision.live.comparison.comparison import Comparison
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,19 +53,15 @@ def stand_beside(session: Session, beside: Beside) -> None:
     FingervisionError
         The model or the log cannot be read, or the gauges are not for these frames.
     """
-    model, bench = beside.model, session.capture.source
     if beside.gauges is not None:
         put_live_gauges(session, beside.gauges, is_asked_for=True)
-    if isinstance(bench, Bench):
-        session.features |= {"bed": bench, "allow_motion": beside.allow_motion}
-        bench.say, bench.supervisor = session.say, session.supervisor
-        if model is None and bench.bed.model is not None:
-            # Prediction for the bed's gripper without the hidden effects, in the same form as the file beside a run's
-            # table.
-            make_out_folder(session.out)
-            model = session.out / SIMULATION
-            write_expected(model, bench.bed.model, bench.bed.limits)
+    join = getattr(session.capture.source, "join", None)  # of a test bed
+    if join is not None:
+        expected = join(session, allow_motion=beside.allow_motion)
+        beside = replace(beside, model=beside.model or expected)
     if beside.drive is not None:
+        from fingervision.tables.read import read_drive
+
         drive = read_drive(beside.drive)
         if drive.time_s.size < 2:
             raise DataError(f"{beside.drive} must have at least two rows, but has {drive.time_s.size}.")
@@ -75,7 +71,23 @@ def stand_beside(session: Session, beside: Beside) -> None:
             return None if found is None else Driven(found.input_mm, found.force_n, found.run or "1")
 
         session.driven_at = driven_at
-    if model is not None:
-        comparison = Comparison(session, model, beside.kind)
-        session.features["model"] = comparison
+    comparison = compared(session, beside)
+    if comparison is not None:
         session.on_row.append(session.supervisor.guarded("Comparing with the model", comparison.add))
+
+
+def compared(view: View, beside: Beside) -> "Comparison | None":
+    """Add the comparison with a model to a view, if a model is given.
+
+    Raises
+    ------
+    FingervisionError
+        The model cannot be read.
+    """
+    if beside.model is None:
+        return None
+    from fingervision.live.comparison.comparison import Comparison  # a second that a view without a model does not wait
+
+    comparison = Comparison(view, beside.model, beside.kind)
+    view.features["model"] = comparison
+    return comparison

@@ -17,10 +17,9 @@ from typing import TextIO
 
 from fingervision.domain.errors import DeviceError, ExitCode
 from fingervision.live.access import Access
-from fingervision.live.beside import Beside, stand_beside
+from fingervision.live.beside import Beside, compared, stand_beside
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
-from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.playback.gauges_beside import put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import Recorded
@@ -216,9 +215,8 @@ def look_through(recording: Recorded, out: Path, showing: Showing, beside: Besid
         The scale is for other frames, or the port is in use.
     """
     playback = Playback(recording, out)
-    comparison = None if beside.model is None else Comparison(playback, beside.model, beside.kind)
+    comparison = compared(playback, beside)
     if comparison is not None:
-        playback.features["model"] = comparison
         playback.on_table = comparison.add_all
         playback.on_stop.append(comparison.stop)
     listening = bound(showing.way.host, showing.way.port)
@@ -278,7 +276,7 @@ def run(capture: Capture, choices: Choices, out: Path, showing: Showing, beside:
             finally:
                 session.stop()
                 comparison = session.features.get("model")
-                if isinstance(comparison, Comparison):
+                if comparison is not None:
                     comparison.stop()
                 if status is not None:
                     status.end()

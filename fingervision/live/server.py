@@ -11,6 +11,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from threading import Event
+from typing import TYPE_CHECKING
 
 import uvicorn
 from starlette.applications import Starlette
@@ -23,7 +24,6 @@ from fingervision.domain.errors import FingervisionError, ProcessError, UsageErr
 from fingervision.live.access import Access
 from fingervision.live.commands import modules
 from fingervision.live.commands.model import MODEL
-from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard, PatientProtocol
 from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
 from fingervision.live.pen import Pen
@@ -32,6 +32,9 @@ from fingervision.live.supervisor import sentence
 from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapsCsv
 from fingervision.storage.out_folder import make_out_folder, out_folder
+
+if TYPE_CHECKING:
+    from fingervision.live.comparison.comparison import Comparison
 
 # Saving of the gaps that the browser page shows.
 
@@ -259,8 +262,9 @@ class Page:
 
     async def _verdict(self, request: Request) -> Response:
         """Send a file of the newest verdict; the report contains scripts, and is saved instead of opened here."""
-        name, comparison = request.path_params["name"], self._view.features.get(MODEL)
-        found = comparison.verdicts.newest if isinstance(comparison, Comparison) else None
+        name = request.path_params["name"]
+        comparison: Comparison | None = self._view.features.get(MODEL)
+        found = None if comparison is None else comparison.verdicts.newest
         path = None if found is None else Path(found.report).parent / name
         if name not in VERDICT_FILES or path is None or not path.is_file():
             return PlainTextResponse("There is no such file of a verdict.", 404)

@@ -24,7 +24,6 @@ from fingervision.live.recorder import Recorder
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.live.supervisor import Supervisor
 from fingervision.live.view import Message, MessageListener, Messages
-from fingervision.measuring.rehearsal import rehearse
 from fingervision.measuring.scale import other_camera
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.grey import full_scale, to_grey
@@ -208,6 +207,8 @@ class Session:
 
     def start(self) -> None:
         """Start the measurement as soon as the source is ready."""
+        from fingervision.measuring.rehearsal import rehearse  # with the renderer, which no recording needs
+
         self.capture.start(self.supervisor)
         rehearse()
         self.capture.begin()

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.motion.encoder import differences, input_sigma
@@ -84,6 +83,8 @@ def _curves(drive: DriveHistory) -> tuple[NDArray[np.intp], tuple[Curve, ...]]:
     reversal at a constant speed of 0.36 mm/s, in a log of 50 rows a second, hides up to 3.6 um of the stroke, by which
     a play seems smaller.
     """
+    from scipy.interpolate import Akima1DInterpolator  # half a second that is spent only with a log
+
     chosen, curves = np.full(max(drive.time_s.size - 1, 0), -1, dtype=np.intp), list[Curve]()
     runs = _runs(drive)
     sigma_mm, _ = input_sigma(drive.input_mm, runs, drive.time_s)

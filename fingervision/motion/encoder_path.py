@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator
 
 from fingervision.domain.effect import Array
 from fingervision.motion.encoder import differences
@@ -341,6 +340,8 @@ def _curve(time_s: Array, input_mm: Array, fine_s: Array, interval: NDArray[np.i
     A stage that arrives and stops has not been beyond its position of rest, and the play depends on the extreme
     position.
     """
+    from scipy.interpolate import Akima1DInterpolator  # half a second that is spent only with a log
+
     curve = np.asarray(Akima1DInterpolator(time_s, input_mm)(fine_s), dtype=np.float64)
     steps = np.abs(np.diff(input_mm))
     beside = np.minimum(np.append(steps[1:], np.inf), np.insert(steps[:-1], 0, np.inf))

@@ -4,7 +4,8 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -19,7 +20,7 @@ from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.frame_range import frame_range
 from fingervision.frames.seeking import frame_times_s
-from fingervision.frames.source import open_source
+from fingervision.frames.source import FrameSource, open_source
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
 from fingervision.live.playback.playback import FrameReader, Playback
@@ -82,14 +83,14 @@ def test_every_frame_is_the_one_it_says_in_any_order(recordings: dict[str, Path]
     for wanted in order:
         # Asked for by its time where the table has one, and by counting.
         for time_s in (whole[wanted].time_s, None):
-            found = reader.at(wanted, time_s)
+            found = reader.at(wanted, lambda time_s=time_s: time_s)
             assert isinstance(found, Frame)
             assert found.index == wanted
             assert number_in(found.pixels) == wanted
             np.testing.assert_array_equal(found.pixels, whole[wanted].pixels)
             reader._kept.clear()
-    assert reader.at(FRAMES, None) is None
-    assert isinstance(reader.at(3, None), Frame)
+    assert reader.at(FRAMES, lambda: None) is None
+    assert isinstance(reader.at(3, lambda: None), Frame)
 
 
 @pytest.mark.parametrize("name", CODINGS)
@@ -106,6 +107,45 @@ def test_frames_have_their_times_before_they_are_measured(
         until(lambda: [view.frame_at(time_s) for time_s in times_s] == [*range(FRAMES)])
     finally:
         view.stop()
+
+
+class Counted:
+    """A source that counts the frames that are read from it."""
+
+    def __init__(self, source: FrameSource) -> None:
+        self.description, self._source, self.read = source.description, source, 0
+
+    def __iter__(self) -> Iterator[Frame | LostFrame]:
+        for item in self._source:
+            self.read += 1
+            yield item
+
+
+def test_a_frame_that_is_asked_for_at_once_is_not_counted_from_the_beginning(
+    recordings: dict[str, Path], tmp_path: Path
+) -> None:
+    opened_now = recorded(str(recordings["h264.mp4"]), None, Choices(), ())
+    source = Counted(opened_now.source)
+    view = Playback(replace(opened_now, source=source), tmp_path / "out")
+    view.start()
+    try:
+        view.seek(FRAMES - 1)
+        until(lambda: view.seen is not None and view.seen.frame.index == FRAMES - 1)
+        assert view.seen is not None
+        assert number_in(view.seen.frame.pixels) == FRAMES - 1
+        assert source.read <= 1
+    finally:
+        view.stop()
+
+
+def test_a_recording_is_shown_without_the_parts_that_it_does_not_need() -> None:
+    heavy = ("fingervision.testbed", "fingervision.rendering", "fingervision.diagnosis", "skfem", "scipy.interpolate")
+    program = (
+        "import sys, fingervision.live.running\nfrom fingervision.live.commands import modules\nmodules()\n"
+        f"print([name for name in {heavy!r} if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
 
 
 @pytest.mark.parametrize("name", ["ffv1.mkv", "h264.mp4", "mjpeg.avi"])
@@ -130,7 +170,7 @@ def test_frames_of_a_damaged_recording_are_counted_where_packets_do_not_number_t
 def test_a_time_that_no_frame_has_is_not_taken_for_a_neighbours(recordings: dict[str, Path]) -> None:
     source = open_source(str(recordings["h264.mp4"]))
     reader = FrameReader(lambda: iter(source), str(recordings["h264.mp4"]))
-    found = reader.at(40, 1.611)
+    found = reader.at(40, lambda: 1.611)
     assert isinstance(found, Frame)
     assert number_in(found.pixels) == 40
 
@@ -142,9 +182,9 @@ def test_a_picture_that_was_put_back_is_read_again(recordings: dict[str, Path], 
     reader = FrameReader(lambda: iter(source), str(folder), are_files=True)
     third = source.description.files[3]
     third.rename(tmp_path / "away")
-    assert isinstance(reader.at(3, None), LostFrame)
+    assert isinstance(reader.at(3, lambda: None), LostFrame)
     (tmp_path / "away").rename(third)
-    found = reader.at(3, None)
+    found = reader.at(3, lambda: None)
     assert isinstance(found, Frame)
     assert number_in(found.pixels) == 3
 

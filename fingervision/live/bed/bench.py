@@ -17,14 +17,17 @@ from fingervision.domain.recipe import Recipe
 from fingervision.frames.source import Description, Driven, Received
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
+from fingervision.live.session import Session
 from fingervision.live.supervisor import Supervisor
 from fingervision.storage.drive_csv import SampleRow
+from fingervision.storage.out_folder import make_out_folder
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.manual.manual_control import Looking, home, jog, move
 from fingervision.testbed.run.controls import Controls
 from fingervision.testbed.run.recipe_run import run_recipe
+from fingervision.testbed.run.run_folder import SIMULATION, write_expected
 from fingervision.testbed.run.synchronised_acquisition import Look, Sight
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden, hidden_from
 
@@ -106,6 +109,30 @@ class Bench:
         if self._thread is not None:
             self._thread.join(ENDS_WITHIN_S)
         self.bed.close()
+
+    def join(self, session: Session, *, allow_motion: bool) -> Path | None:
+        """Become the test bed of a session.
+
+        Parameters
+        ----------
+        session : Session
+            The live measurement whose source this is.
+        allow_motion : bool
+            Whether users of the browser page may move the stage.
+
+        Returns
+        -------
+        Path or None
+            Prediction for the gripper of the bed without the hidden effects, in the form of the file beside a run's
+            table; None if its gripper has no model.
+        """
+        session.features |= {"bed": self, "allow_motion": allow_motion}
+        self.say, self.supervisor = session.say, session.supervisor
+        if self.bed.model is None:
+            return None
+        make_out_folder(session.out)
+        write_expected(session.out / SIMULATION, self.bed.model, self.bed.limits)
+        return session.out / SIMULATION
 
     # ---- requests, from any thread
     def stop(self) -> None:

@@ -2,13 +2,15 @@
 
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fingervision.domain.errors import StateError, UsageError
-from fingervision.live.bed.bench import Bench
 from fingervision.live.commands.asking import Answer, Request, number, shown, words
 from fingervision.live.view import View
 from fingervision.storage.recipe_toml import read_recipe
+
+if TYPE_CHECKING:
+    from fingervision.live.bed.bench import Bench
 
 BED, MOTION = "bed", "allow_motion"
 LONGEST_JOG_S = 10.0
@@ -16,14 +18,14 @@ LONGEST_JOG_S = 10.0
 READ_ONLY = "This page may only watch the test bed: whoever starts the live view can allow motions."
 
 
-def _bench(view: View) -> Bench:
-    bench = view.features.get(BED)
-    if not isinstance(bench, Bench):
+def _bench(view: View) -> "Bench":
+    bench: Bench | None = view.features.get(BED)
+    if bench is None:
         raise StateError("This live view has no test bed: start the live view of a test bed.")
     return bench
 
 
-def _movable(view: View) -> Bench:
+def _movable(view: View) -> "Bench":
     bench = _bench(view)
     if not view.features.get(MOTION):
         raise StateError(READ_ONLY)
@@ -78,8 +80,8 @@ def _inside(view: View, name: str) -> Path:
 
 def section(view: View) -> dict[str, Any]:
     """Return the state of the test bed for the browser page: position and present task."""
-    bench = view.features.get(BED)
-    if not isinstance(bench, Bench):
+    bench: Bench | None = view.features.get(BED)
+    if bench is None:
         return {"bed": None}
     return {
         "bed": {

@@ -1,13 +1,15 @@
 """Requests about the model for comparison, and about an input entered by the user."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fingervision.domain.errors import StateError
 from fingervision.frames.source import Driven
 from fingervision.live.commands.asking import Answer, Request, number_or_none
-from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.session import Session
 from fingervision.live.view import View
+
+if TYPE_CHECKING:
+    from fingervision.live.comparison.comparison import Comparison
 
 MODEL, TYPED = "model", "typed_input"
 
@@ -30,8 +32,8 @@ def _input(view: View, request: Request) -> Answer:
 
 def section(view: View) -> dict[str, Any]:
     """Return prediction, residual and verdict for the browser page."""
-    comparison = view.features.get(MODEL)
-    return {"model": comparison.state() if isinstance(comparison, Comparison) else None}
+    comparison: Comparison | None = view.features.get(MODEL)
+    return {"model": None if comparison is None else comparison.state()}
 
 
 COMMANDS = {"input": _input}

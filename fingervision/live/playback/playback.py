@@ -5,7 +5,7 @@ from bisect import bisect_left
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from threading import Condition, Thread
+from threading import Condition, Event, Thread
 from time import monotonic
 from typing import Any
 
@@ -61,15 +61,16 @@ class FrameReader:
         self._kept: OrderedDict[int, Item] = OrderedDict()
         self._seeking: Seeking | None = seeking(name)
 
-    def at(self, index: int, time_s: float | None) -> Item | None:
+    def at(self, index: int, time_of: Callable[[], float | None]) -> Item | None:
         """Return the frame with a given number in the recording.
 
         Parameters
         ----------
         index : int
             Number of the frame, from 0.
-        time_s : float or None
-            Time of the frame, if the time is known and no neighbouring frame has the same time; otherwise None.
+        time_of : callable
+            Function that returns the time of the frame (s), or None if it is not known surely or if a neighbouring
+            frame has the same time. It is called only where the time is needed, and may wait for it.
 
         Returns
         -------
@@ -85,7 +86,7 @@ class FrameReader:
             self._kept.move_to_end(index)
             return self._kept[index]
         is_near = self._following <= index < self._following + NEAR_FRAMES
-        if not is_near and self._seeking is not None and time_s is not None:
+        if not is_near and self._seeking is not None and (time_s := time_of()) is not None:
             found = self._seeking.frame(index, time_s)
             if found is not None:
                 self._keep(found)
@@ -161,6 +162,7 @@ class Playback:
         )
         # Times from the packets, for frames that the table has not reached.
         self._times_s: list[float] = []
+        self._times_read = Event()
         self._shown: object = None
         self._requests = 0
         self._stopped = False
@@ -173,8 +175,7 @@ class Playback:
         """Start the measurement and the display."""
         self._measure_anew()
         self._thread = self.supervisor.start(PLAYING, self._play)
-        if not self._is_marked:
-            self.supervisor.start("Reading the times of the recording", self._read_times)
+        self.supervisor.start("Reading the times of the recording", self._read_times)
 
     def stop(self) -> None:
         """Stop the measurement and the display."""
@@ -182,6 +183,7 @@ class Playback:
             end()
         with self._changed:
             self._stopped = True
+            self._times_read.set()
             self._changed.notify_all()
         if self._thread is not None:
             self._thread.join()
@@ -347,7 +349,12 @@ class Playback:
 
     def _read_times(self) -> None:
         # What FFmpeg says of damage is heard by all threads, so that one reader's damage would be taken for another's.
-        self._times_s = [round(time_s, TIME_PLACES) for time_s in in_own_process(frame_times_s, self.recorded.name)]
+        try:
+            if not self._is_marked:
+                times_s = in_own_process(frame_times_s, self.recorded.name)
+                self._times_s = [round(time_s, TIME_PLACES) for time_s in times_s]
+        finally:
+            self._times_read.set()
 
     def _told_time(self, frame: int) -> float | None:
         """Time of a frame (s) by its packet; None if the table so far shows that packets do not number the frames."""
@@ -407,7 +414,7 @@ class Playback:
 
     def _show(self, frame: int, row: GapRow | None) -> None:
         try:
-            item = self._reader.at(frame, self._own_time(frame, row))
+            item = self._reader.at(frame, lambda: self._own_time(frame, row))
             self._refuse_missing(item, frame, row)
             if item is None:
                 item = LostFrame(frame, None, Status.DAMAGED, "The recording has no frame of this number.")
@@ -429,6 +436,7 @@ class Playback:
     def _own_time(self, frame: int, row: GapRow | None) -> float | None:
         """Time by which a frame is found (s); None without a picture, or if a neighbouring frame has the same time."""
         if row is None:
+            self._times_read.wait()  # some seconds, while counting the frames of an hour would take minutes
             return self._told_time(frame)
         if row.time_s is None or row.status in NO_PICTURE:
             return None
