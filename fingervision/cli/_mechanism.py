@@ -180,7 +180,7 @@ def predict(
         write_pair_grip(models, gripped, None if drive is None else inputs, out, as_json=as_json)
     if not as_json:
         say_endurance(chief, mechanism.material, states[chief])
-    warn(mechanism, models[chief], states[chief], table[chief].get("input_at_yield_mm", np.nan), contact=contact)
+    warn(mechanism, models[chief], states[chief], table[chief], contact=contact)
     for sentence in found.warnings:
         click.echo(f"Warning: {sentence}", err=True)
 

@@ -84,9 +84,14 @@ def say_drawing(mechanism: Mechanism) -> None:
 
 
 def warn(
-    mechanism: Mechanism, model: MechanismModel, states: Sequence[MechanismState], at_yield_mm: float, *, contact: bool
+    mechanism: Mechanism,
+    model: MechanismModel,
+    states: Sequence[MechanismState],
+    figures: Mapping[str, float],
+    *,
+    contact: bool,
 ) -> None:
-    """Warn of yielding, and of faces that penetrate each other."""
+    """Warn of yielding, buckling, necks that are no flexures, and faces that penetrate each other."""
     if (corner := getattr(model, "unstated_stress_at_mm", None)) is not None:
         click.echo(
             f"Warning: the stress is not stated, because the outline has a re-entrant corner without a radius at "
@@ -100,15 +105,21 @@ def warn(
             "flexure: move the shapes apart there, or draw the neck as a [[flexure]], as its stress is not judged.",
             err=True,
         )
+    ends = [state.input_mm for state in (states[0], states[-1])]
+    if min(ends) <= figures.get("input_at_buckling_mm", np.inf) <= max(ends):
+        click.echo(
+            f"Warning: a flexure buckles at an input of {figures['input_at_buckling_mm']:.3g} mm, before it yields; "
+            "results beyond do not hold: load it less, or make it thicker or shorter.",
+            err=True,
+        )
     worst = max(states, key=lambda state: state.stress_mpa)
     if worst.stress_mpa > mechanism.material.yield_mpa:
         click.echo(
             f"Warning: at an input of {worst.input_mm:.3g} mm the stress in the flexures must stay below the yield "
             f"stress of {mechanism.material.yield_mpa:g} MPa, but is {worst.stress_mpa:.3g} MPa; keep the input within "
-            f"{at_yield_mm:.3g} mm.",
+            f"{figures['input_at_yield_mm']:.3g} mm.",
             err=True,
         )
-    ends = [state.input_mm for state in (states[0], states[-1])]
     for name, at_mm in model.touch_input_mm().items():
         if not contact and min(ends) < at_mm < max(ends):
             click.echo(

@@ -365,6 +365,7 @@ def predict_mechanism(
         raise next(iter(refusals.values()))
     chief = next(iter(models))
     at_yield_mm = figures[chief].get("input_at_yield_mm", _OF_SIZE * mechanism.region.size_mm)
+    at_yield_mm = min(at_yield_mm, abs(figures[chief].get("input_at_buckling_mm", at_yield_mm)))
     touching = models[chief].touch_input_mm().values() if physics.contact and driven is not None else ()
     inputs = _mechanism_inputs(driven, at_yield_mm, touching, is_curved=physics != LINEAR)
     states = {

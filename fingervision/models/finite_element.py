@@ -54,6 +54,8 @@ _ACROSS, _BODY = 4.0, 0.025
 _STRESS_ERROR = 0.01
 """Relative error of the stress; meshes twice and three times as fine differ by 0.3 %
 (`tests/benchmarks/models_held_out.py`)."""
+_BUCKLING = 4
+"""Number of buckling inputs nearest to rest that are sought on both sides together."""
 _BESIDE_CORNER = 0.5
 """Distance from a sharp corner, in thicknesses of the thinnest flexure, within which stress is left out, because it
 depends on the mesh there."""
@@ -177,6 +179,19 @@ class MechanismPlate(ElasticMechanism):
             tuple(partial(pair.gaps_mm, plate) for pair in self._pairs),
         )  # fmt: skip
         return with_actuators(system, self._drive_rows, self.mechanism)
+
+    def buckling_inputs_mm(self) -> Array:
+        """Inputs on either side of rest at which a flexure buckles in the plane, in rising order (mm).
+
+        By linear theory, the stiffness and u times the geometric stiffness per 1 mm of input are singular there (Bonet
+        and Wood, as for `PlaneStressPlate.internal_force_n`). An input is infinite if there is none, or if all that are
+        sought are on the other side of rest.
+        """
+        system = self.driven
+        geometric = self.plate.geometric_stiffness_n_mm(system.unit_displacement)
+        found = system.eigenvalues(geometric, _BUCKLING)
+        low, high = min(found), max(found)
+        return np.array([-1.0 / high if high > 0.0 else -np.inf, -1.0 / low if low < 0.0 else np.inf])
 
     def _wanders(self) -> bool:
         """Whether the supports allow a rigid motion of the whole mechanism."""

@@ -70,6 +70,8 @@ amplifies as much."""
 _DENSE_BELOW = 1000
 """Number of unknowns below which natural modes are found with full matrices."""
 _STILL = 1e-9
+_CLOSE = 1e-4
+"""Relative error of eigenvalues of which few digits count."""
 _STRAINLESS = 1e-8
 """Strain energy under all drives together, as a share of the strain energies under each drive alone, below which the
 body counts as moving rigidly; rounding errors give 1e-11."""
@@ -354,6 +356,14 @@ class DrivenMechanism:
         if not drive_held and not by_stage and self.actuators is not None:
             drive = self.per_input @ (self.actuators.rows.T @ shapes) / (self.per_input @ self.per_input)
         return np.sqrt(squared[order]), shapes, drive
+
+    def eigenvalues(self, matrix: csr_matrix, count: int) -> list[float]:
+        """Eigenvalues of largest size of a symmetric matrix relative to the stiffness at rest."""
+        own, rest = (csr_matrix(self.motions.T @ each @ self.motions) for each in (matrix, self.stiffness_n_mm))
+        inverse = LinearOperator(rest.shape, self._solver.solve, dtype=np.float64)
+        start = np.ones(rest.shape[0])
+        found = eigsh(own, count, rest, Minv=inverse, v0=start, tol=_CLOSE, return_eigenvectors=False)
+        return [float(value) for value in found]
 
     def touch_inputs_mm(self) -> list[float | None]:
         """Input nearest to zero (mm) at which each contact pair touches, for small displacements; None if never."""

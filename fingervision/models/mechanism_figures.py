@@ -236,6 +236,9 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     if "peak_stress_mpa_per_mm" in figures:
         errors["model_error_stress_percent"] = 100.0 * model.stress_error
     if isinstance(model, MechanismPlate):
+        buckles = min(model.buckling_inputs_mm().tolist(), key=abs)
+        if abs(buckles) < figures.get("input_at_yield_mm", 0.0):
+            figures["input_at_buckling_mm"] = buckles
         figures |= operating_figures_of(model)
         across = out_of_plane(model.mechanism)
         figures["first_out_of_plane_mode_hz"] = across.modes_hz[0]

@@ -77,6 +77,8 @@ def _shapes(at: Array) -> tuple[Array, Array]:
     return values, np.array([by_s, by_t]).T
 
 
+_SMALL = 1e-3
+"""Share of displacements from both signs of which the stress of small displacements is computed, exactly."""
 _CORNERS = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -233,14 +235,27 @@ class PlaneStressPlate:
         elements = np.swapaxes(along, 1, 2) @ stressed.reshape(triangles, 3 * points, 12)
         if not displacement_mm.any():
             return self._assembled(elements, at_rest=True), np.zeros(self.unknowns)
-        # Geometric stiffness: present stress resists rotation (product of shape slopes, stress and shape slopes).
+        self._add_geometric(elements, stress)
+        return self._assembled(elements, at_rest=False), self._collected(deformation, stress)
+
+    def geometric_stiffness_n_mm(self, displacement_mm: Array) -> csr_matrix:
+        """Stiffness by which the stress of small displacements resists rotation; proportional to them."""
+        (_, up), (_, down) = self._deformed(_SMALL * displacement_mm), self._deformed(-_SMALL * displacement_mm)
+        elements = np.zeros((up.shape[0], 12, 12))
+        self._add_geometric(elements, (up - down) / (2.0 * _SMALL))
+        return self._assembled(elements, at_rest=False)
+
+    def _add_geometric(self, elements: Array, stress: Array) -> None:
+        """Add the product of shape slopes, stress and shape slopes to the triangles' matrices."""
+        slopes, weights = self._slopes
+        triangles, points = weights.shape
+        dx, dy = slopes[..., 0, :], slopes[..., 1, :]
         sx, sy, txy = (stress[..., k, None] * weights[..., None] for k in range(3))
         pulled = np.stack([sx * dx + txy * dy, txy * dx + sy * dy], axis=2)
         flat = slopes.reshape(triangles, 2 * points, 6)
         turned = np.swapaxes(flat, 1, 2) @ pulled.reshape(triangles, 2 * points, 6)
         elements[:, :6, :6] += turned
         elements[:, 6:, 6:] += turned
-        return self._assembled(elements, at_rest=False), self._collected(deformation, stress)
 
     def nodal_force_n(self, displacement_mm: Array) -> Array:
         """Nodal forces of the deformed plate without the tangent stiffness, at a tenth of the cost."""
@@ -283,7 +298,7 @@ class PlaneStressPlate:
     @cached_property
     def _pattern(self) -> tuple[Indices, Indices, Indices]:
         """Position of every triangle's entries in the matrix, and the matrix's columns and row starts."""
-        unknowns = self.unknowns_of_triangles
+        unknowns = self.unknowns_of_triangles.astype(np.int64)  # products of two numbers exceed 32 bits
         key = np.repeat(unknowns, 12, axis=1).ravel() * self.unknowns + np.tile(unknowns, (1, 12)).ravel()
         kept, place = np.unique(key, return_inverse=True)
         starts = np.searchsorted(kept, np.arange(self.unknowns + 1) * self.unknowns)
