@@ -5,11 +5,14 @@ equally. A difference between the shifts of the two halves, caused by too little
 mean shift.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from skimage.registration import phase_cross_correlation
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
@@ -25,8 +28,6 @@ MARGIN_PX = 12
 FEWEST_ROWS, MOST_ROWS = 24, 256
 # The registration is refined to 1/50 pixel; more than 60 frames would not improve the result.
 UPSAMPLED, MOST_FRAMES = 50, 60
-# Steps of the refinement on either side of the peak of the correlation: three quarters of a pixel.
-REFINED = 37
 # Structures coarser than this (pixels) are removed, because uneven light does not move with the background.
 COARSE_PX = 8.0
 # Largest standard uncertainty (pixels) from the difference between the two halves; above this limit, noise is
@@ -114,16 +115,8 @@ def _registered(first: Floats, now: Floats) -> Floats:
     .. [1] Guizar-Sicairos, Thurman and Fienup, 2008, Efficient subpixel image registration algorithms, Optics Letters
        33(2), 156-158, doi:10.1364/OL.33.000156.
     """
-    product = np.fft.fft2(first) * np.conj(np.fft.fft2(now))
-    peak = np.unravel_index(np.argmax(np.abs(np.fft.ifft2(product))), first.shape)
-    whole = [at - size if at > size // 2 else at for at, size in zip(peak, first.shape, strict=True)]
-    around = np.arange(-REFINED, REFINED + 1) / UPSAMPLED
-    rows, columns = (
-        np.exp(2j * np.pi * np.outer(at + around, np.fft.fftfreq(size)))
-        for at, size in zip(whole, first.shape, strict=True)
-    )
-    best = np.unravel_index(np.argmax(np.abs(rows @ product @ columns.T)), (around.size, around.size))
-    return np.asarray(whole) + around[list(best)]
+    register: Callable[..., Any] = phase_cross_correlation  # the library states no types
+    return np.asarray(register(first, now, upsample_factor=UPSAMPLED, normalization=None)[0], dtype=np.float64)
 
 
 def _detail(levels: NDArray[np.float32]) -> Floats:
