@@ -33,6 +33,7 @@ Examples:
   fingervision live opening.mp4 --px-per-mm 34         look through a recording: scrub, step, play, measure a range
   fingervision live runs/2026-05-04T10-11-12Z          look through a run, measured as it was
   fingervision live opening.mp4 --calibration calibration.json --drive drive.csv --model comsol.csv
+  fingervision live faulty.mp4 --beside healthy.mp4 --px-per-mm 34     two recordings and the difference of their gaps
   fingervision live --bed simulated --hide backlash:play_mm=0.03 --allow-motion
   fingervision live 0 --px-per-mm 34 --gauges my.toml  edges, marks and patches of one's own, drawn in the picture
   fingervision live 0 --px-per-mm 34 --no-page         gap, status and rate in the terminal
@@ -89,6 +90,13 @@ LIVE_FOLDER = Path("live")
     "--model", "model_path", type=MODEL_FILE, group=MODEL, help="Compare the gap with this model while it is measured."
 )
 @kind_option
+@option(
+    "--beside",
+    "second",
+    metavar="RECORDING",
+    group=MODEL,
+    help="Second recording or run folder, shown in step with the first, with the difference of the gaps.",
+)
 @drive_options(
     "Log of the stage (drive.csv) on the clock of this live view or recording.",
     "Clock offset in seconds, added to the drive's times; determined for a recording if not given.",
@@ -147,6 +155,7 @@ def command(
     white_balance_k: float | None,
     model_path: Path | None,
     kind: str,
+    second: str | None,
     drive: Path | None,
     drive_offset_s: float | None,
     gauges: Path | None,
@@ -184,6 +193,8 @@ def command(
         raise UsageError(
             "--gauges are shown on the browser page: leave out --no-page, or use `fingervision measure --gauges`."
         )
+    if second is not None and model_path is not None:
+        raise UsageError("--beside and --model both fill the panel of the difference: leave one of them out.")
     if drive_offset_s is not None and drive is None:
         raise UsageError("--drive-offset-s needs a --drive.")
     if source is None and bed_name is None:
@@ -216,8 +227,10 @@ def command(
         if size is not None:
             raise UsageError(f"--size is for cameras, but {source} is a recording: leave it out.")
         seen = recorded(source, rate_hz, choices, _drive_options(drive, drive_offset_s))
-        look_through(seen, out or LIVE_FOLDER, showing, beside, gauges)
+        look_through(seen, out or LIVE_FOLDER, showing, beside, gauges, (second, rate_hz, choices) if second else None)
         return
+    if second is not None:
+        raise UsageError("--beside is for a recording, but the source is live: record it, and open the recording.")
     camera = CameraWish(pixel_format, exposure_ms, gain, focus, white_balance_k)
     capture = opened(source, Wish(rate_hz, None if size is None else _size(size), camera))
     run(capture, choices, out or LIVE_FOLDER, showing, beside)

@@ -1,7 +1,7 @@
 """Compose a message to the browser page: changes since the last message, and the newest picture with measured edges."""
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from time import monotonic
@@ -23,6 +23,8 @@ from fingervision.vision.overlay import in_eight_bits
 JPEG_QUALITY = 85
 # Time for which a composed state is used again; rows, messages and the picture's values are always the newest.
 STATE_FOR_S = 0.2
+# Features with which the rows are compared.
+COMPARED = ("model", "second")
 # Largest number of rows in one message.
 ROWS_AT_ONCE = 3000
 # Number of rows that can be converted to text within a millisecond.
@@ -104,12 +106,17 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
 
 
 def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
-    """Rows for the chart: time, gap, u, frame, reason for no gap, u's random part if less, and the model's gap."""
-    model = view.features.get("model")
-    predicted: list[float | None] = [None] * len(rows)
-    if model is not None:
-        with view.supervisor.watching("Predicting the gap"):
-            predicted = model.predicted_mm(rows)
+    """Rows for the chart: time, gap, u, frame, reason for no gap, u's random part if less, and what is compared.
+
+    What is compared is the model's gap, or the gap of a second recording and the uncertainty of the difference.
+    """
+    model, second = (view.features.get(name) for name in COMPARED)
+    compared: list[Sequence[float]] = [()] * len(rows)
+    with view.supervisor.watching("Comparing the gap"):
+        if model is not None:
+            compared = [() if gap_mm is None else (gap_mm,) for gap_mm in model.predicted_mm(rows)]
+        elif second is not None:
+            compared = [each or () for each in second.differences(rows)]
     return [
         [
             row.time_s if row.time_s is not None else row.frame,
@@ -118,9 +125,9 @@ def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
             row.frame,
             "" if row.status is Status.OK else row.status.value,
             None if row.u_gap_mm is None else row.u_random_mm,
-            *([] if gap_mm is None else [gap_mm]),
+            *beside,
         ]
-        for row, gap_mm in zip(rows, predicted, strict=True)
+        for row, beside in zip(rows, compared, strict=True)
     ]
 
 
@@ -162,7 +169,7 @@ def _overlay(outcome: GapMeasurement | NoGap | None) -> dict[str, Any]:
     }
 
 
-def _picture(seen: Seen) -> bytes:
+def coded(seen: Seen) -> bytes:
     """The picture as JPEG; the page itself draws the measured points and shows frame number and value as text."""
     levels = in_eight_bits(seen.frame.pixels)
     if levels.ndim == 2:
@@ -183,7 +190,7 @@ def is_short(view: View, known: Known) -> bool:
     return (
         known.identity == view.identity
         and view.row_count - known.rows < ROWS_IN_A_MOMENT
-        and "model" not in view.features
+        and not any(name in view.features for name in COMPARED)
     )
 
 
@@ -203,7 +210,7 @@ class _Pictures:
     def of(self, seen: Seen) -> bytes:
         with self._lock:
             if self._seen is not seen:
-                self._seen, self._coded = seen, _picture(seen)
+                self._seen, self._coded = seen, coded(seen)
             return self._coded
 
 

@@ -23,6 +23,7 @@ from fingervision.live.choices import Choices
 from fingervision.live.playback.gauges_beside import put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import Recorded
+from fingervision.live.playback.second_recording import beside_recording
 from fingervision.live.run_folder import remove_leftovers
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
@@ -206,8 +207,30 @@ class Showing:
     browser: bool = True
 
 
-def look_through(recording: Recorded, out: Path, showing: Showing, beside: Beside, gauges: Path | None = None) -> None:
-    """Show a recording in the browser page until the user ends it; `gauges` names a gauge file and opens its panel.
+def look_through(
+    recording: Recorded,
+    out: Path,
+    showing: Showing,
+    beside: Beside,
+    gauges: Path | None = None,
+    second: tuple[str, float | None, Choices] | None = None,
+) -> None:
+    """Show a recording in the browser page until the user ends it.
+
+    Parameters
+    ----------
+    recording : Recorded
+        The recording.
+    out : Path
+        Folder for files that the user saves.
+    showing : Showing
+        How the page is shown.
+    beside : Beside
+        The model, if there is one.
+    gauges : Path or None
+        A gauge file, whose panel is opened.
+    second : (str, float or None, Choices) or None
+        A second recording with its frame rate and the settings that the user chose, as for `beside_recording`.
 
     Raises
     ------
@@ -219,6 +242,7 @@ def look_through(recording: Recorded, out: Path, showing: Showing, beside: Besid
     if comparison is not None:
         playback.on_table = comparison.add_all
         playback.on_stop.append(comparison.stop)
+    other = None if second is None else beside_recording(*second, playback)
     listening = bound(showing.way.host, showing.way.port)
     if gauges is not None:
         put_gauges_beside(playback, gauges, is_asked_for=True)
@@ -228,6 +252,8 @@ def look_through(recording: Recorded, out: Path, showing: Showing, beside: Besid
     with _printing(playback, showing) as (out_there, _), _until_signalled() as signalled:
         try:
             playback.start()
+            if other is not None:
+                other.start()
             _announce(page, out_there, browser=showing.browser)
             page.serve(signalled)
         finally:

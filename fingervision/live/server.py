@@ -28,6 +28,8 @@ from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard, PatientPr
 from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
 from fingervision.live.pen import Pen
 from fingervision.live.picture_watch import PictureWatch
+from fingervision.live.playback.second_recording import SECOND
+from fingervision.live.preview import coded
 from fingervision.live.supervisor import sentence
 from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapsCsv
@@ -186,6 +188,7 @@ class Page:
                 Route("/gaps.csv", self._gaps),
                 Route("/steps/{number}.png", self._step),
                 Route("/verdict/{name}", self._verdict),
+                Route("/second.jpg", self._second),
                 WebSocketRoute("/socket", self._socket),
             ],
             exception_handlers={Exception: self._failed},
@@ -269,6 +272,13 @@ class Page:
         if name not in VERDICT_FILES or path is None or not path.is_file():
             return PlainTextResponse("There is no such file of a verdict.", 404)
         return FileResponse(path, filename=name, content_disposition_type=VERDICT_FILES[name])
+
+    async def _second(self, request: Request) -> Response:
+        """Send the newest picture of the second recording."""
+        second = self._view.features.get(SECOND)
+        if second is None or second.seen is None:
+            return PlainTextResponse("There is no picture of a second recording.", 404)
+        return Response(await asyncio.to_thread(coded, second.seen), media_type="image/jpeg")
 
     async def _socket(self, page: WebSocket) -> None:
         if len(self._sockets) >= PAGES_AT_ONCE:

@@ -2,7 +2,7 @@
 import { at, colour, download, on, page, tell, withToken } from "/page/bus.js";
 import { view } from "/page/chart.js";
 import { svg } from "/page/export_svg.js";
-import { gaps } from "/page/gap_data.js";
+import { gaps, terms } from "/page/gap_data.js";
 
 const KEPT_MS = 60000, PNG_SCALE = 2;
 const seenTimes = () => [view.chart.scales.x.min, view.chart.scales.x.max];
@@ -14,7 +14,7 @@ function save(content, kind, name, words) {
 }
 function title() {
   const { state } = page, zero = state && state.zero_mm ? `, less zero ${state.zero_mm.toFixed(4)} mm` : "";
-  return `Gap of ${state ? state.source : ""}${zero}; band: k = 2; ${new Date().toISOString()}`;
+  return `Gap of ${state ? state.source : ""}${state && state.second ? ` (dashed: ${state.second.source})` : ""}${zero}; band: k = 2; ${new Date().toISOString()}`;
 }
 const drawn = () => svg(title(), view.chart.data, at("residual_chart").hidden || !view.residual ? null : view.residual.data, seenTimes());
 on("save_csv", "click", () => download(withToken("/gaps.csv"), "gaps.csv"));
@@ -34,7 +34,7 @@ on("save_plot", "click", async () => {
 });
 on("save_seen", "click", () => {
   const [from, to] = seenTimes(), zero = page.state.zero_mm, cell = (value) => (value === null ? "" : value.toFixed(7));
-  const lines = ["frame,time_s,status,gap_mm,expanded_u_gap_mm,model_mm,residual_mm"];
+  const lines = [`frame,time_s,status,gap_mm,expanded_u_gap_mm,${terms()[0]}_mm,${terms()[1]}_mm`];
   gaps.time.forEach((time, i) => {
     if (time < from || time > to || gaps.frame[i] === null) return;
     const gap = gaps.gap[i], model = gaps.model[i], known = gap !== null;

@@ -2,6 +2,7 @@
 import { at, colour } from "/page/bus.js";
 import { decimals } from "/page/axis_labels.js";
 import { failures } from "/page/chart_failures.js";
+import { terms } from "/page/gap_data.js";
 
 const WIDE = 900, LEFT = 70, RIGHT = 15, TOP = 34, GAP_HIGH = 300, RESIDUAL_HIGH = 150, BETWEEN = 22, FOOT = 44, TICKS = 6;
 const escaped = (words) => words.replace(/[&<>]/g, (sign) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[sign]);
@@ -49,7 +50,7 @@ export function svg(title, gap, residual, [from, to]) {
   let foot = TOP + GAP_HIGH;
   const parts = [drawn];
   for (const run of failures(from, to)) parts.push(`<rect x="${(x(run.from) - 1).toFixed(2)}" y="${foot - 8}" width="${Math.max(2, x(run.to) - x(run.from) + 2).toFixed(2)}" height="8" fill="${colour("--bad")}"><title>${escaped(run.status)}</title></rect>`);
-  if (residual) { parts.push(panel("residual", inside(residual), [from, to], foot + BETWEEN, RESIDUAL_HIGH, colour("--model"), "residual (µm)")[0]); foot += BETWEEN + RESIDUAL_HIGH; }
+  if (residual) { parts.push(panel("residual", inside(residual), [from, to], foot + BETWEEN, RESIDUAL_HIGH, colour("--model"), `${terms()[1]} (µm)`)[0]); foot += BETWEEN + RESIDUAL_HIGH; }
   for (const [at, words] of ticks(from, to)) parts.push(`<text x="${x(at).toFixed(2)}" y="${foot + 16}" text-anchor="middle">${words}</text>`);
   parts.push(`<text x="${(LEFT + WIDE - RIGHT) / 2}" y="${foot + 34}" text-anchor="middle">time (s)</text>`);
   const high = foot + FOOT;

@@ -1,6 +1,6 @@
 // A range that is dragged over the chart is measured; it stays until another one, Escape, or its button.
 import { ask, at, colour, listen, on, page, say, tell } from "/page/bus.js";
-import { gaps } from "/page/gap_data.js";
+import { gaps, terms } from "/page/gap_data.js";
 import { redraw, zoomTo } from "/page/chart.js";
 import { statistics } from "/page/range_statistics.js";
 
@@ -17,7 +17,10 @@ function words() {
     `mean ${pm(found.mean - state.zero_mm, found.U_mean)} mm`, `slope ${pm(found.slope, found.U_slope)} mm/s`,
     `first to last ${pm(found.change, found.U_change)} mm`,
     `${(found.least - state.zero_mm).toFixed(4)} to ${(found.greatest - state.zero_mm).toFixed(4)} mm`];
-  if (found.residual) parts.push(`residual mean ${(1e3 * found.residual.mean).toFixed(1)}, RMS ${(1e3 * found.residual.rms).toFixed(1)} µm`);
+  if (found.residual) {
+    const { n, mean, rms, U_mean } = found.residual, um = (mm) => (1e3 * mm).toFixed(1);
+    parts.push(`${terms()[1]}${n < found.n ? ` of ${n} frames:` : ""} mean ${um(mean)}${U_mean === null ? "" : ` ± ${um(U_mean)}`}, RMS ${um(rms)} µm`);
+  }
   return `${parts.join(" · ")} (± at k = 2${u_scale === null ? ", from frame to frame only: the scale has no uncertainty" : ""})`;
 }
 function show() {

@@ -1,7 +1,7 @@
 // What a range of the chart says: mean and slope of the gap with their uncertainty (k = 2), its change, and the model's
 // residual. Noise from frame to frame averages out, the scale's share does not.
 const sum = (values) => values.reduce((total, value) => total + value, 0);
-const mean = (values) => sum(values) / values.length;
+const mean = (values) => sum(values) / values.length, rms = (values) => Math.sqrt(mean(values.map((each) => each ** 2)));
 
 // `columns` as in gap_data; `u_scale` is the scale's relative standard uncertainty, null where it is not known.
 export function statistics(columns, from, to, u_scale = null) {
@@ -16,11 +16,13 @@ export function statistics(columns, from, to, u_scale = null) {
   // Where the gap does not follow a line, what is left over widens the slope's uncertainty, as it does not follow one.
   const U_slope = 2 * Math.hypot(Math.sqrt(Math.max(rest, noise) / spread), slope * (u_scale || 0));
   const residual = places.flatMap((i) => (columns.model[i] === null ? [] : [columns.gap[i] - columns.model[i]]));
+  // How much of the difference of two recordings is common to all frames is not known: nothing is taken to average out.
+  const u_difference = places.flatMap((i) => (columns.u_difference[i] === null ? [] : [columns.u_difference[i]]));
   return {
     n, from: time[0], to: time[n - 1], first: columns.frame[places[0]], last: columns.frame[places[n - 1]],
     mean: gap_0, U_mean: 2 * Math.sqrt(noise / n + fixed), slope, U_slope,
     change: gap[n - 1] - gap[0], U_change: 2 * Math.hypot(random[0], random[n - 1], (gap[n - 1] - gap[0]) * (u_scale || 0)),
     least: gap.reduce((a, b) => Math.min(a, b)), greatest: gap.reduce((a, b) => Math.max(a, b)),
-    residual: residual.length ? { mean: mean(residual), rms: Math.sqrt(mean(residual.map((each) => each ** 2))) } : null,
+    residual: residual.length ? { n: residual.length, mean: mean(residual), rms: rms(residual), U_mean: u_difference.length ? 2 * rms(u_difference) : null } : null,
   };
 }

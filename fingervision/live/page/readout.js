@@ -1,6 +1,6 @@
 // The chart read out: by the pointer, and by arrow keys from sample to sample.
 import { at, listen, page } from "/page/bus.js";
-import { gaps, nearest } from "/page/gap_data.js";
+import { gaps, halfOf, nearest, terms } from "/page/gap_data.js";
 import { showTime, view } from "/page/chart.js";
 
 export function words(i) {
@@ -10,7 +10,7 @@ export function words(i) {
   else {
     const half = gaps.high[i] - gap;
     parts.push(`${(gap - zero).toFixed(4)}${half > 0 ? ` ± ${half.toFixed(4)}` : ""} mm`);
-    if (gaps.model[i] !== null) parts.push(`model ${(gaps.model[i] - zero).toFixed(4)} mm, residual ${(1000 * (gap - gaps.model[i])).toFixed(1)} µm`);
+    if (gaps.model[i] !== null) parts.push(`${terms()[0]} ${(gaps.model[i] - zero).toFixed(4)} mm, ${terms()[1]} ${(1000 * (gap - gaps.model[i])).toFixed(1)} ± ${(1000 * halfOf(gaps, i)).toFixed(1)} µm`);
   }
   return parts.join(" · ");
 }

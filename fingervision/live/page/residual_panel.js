@@ -1,7 +1,7 @@
 // The residual under the gap, on the same time axis: measured less predicted, with its band; and where it is largest.
 import { ask, at, colour, listen, on, page, tell } from "/page/bus.js";
 import { decimals } from "/page/axis_labels.js";
-import { gaps, residuals } from "/page/gap_data.js";
+import { gaps, residuals, terms } from "/page/gap_data.js";
 import { axisOf, bandOf, cursor, make as makeChart, redraw, seriesOf, sizeOf, steer, view } from "/page/chart.js";
 import { key } from "/page/keys.js";
 import { goTo } from "/page/readout.js";
@@ -16,7 +16,7 @@ function make() {
     legend: { show: false },
     cursor,
     scales: { x: { time: false } },
-    axes: [{ ...axisOf("time (s)"), label: null, values: seconds }, axisOf("resid. (µm)")],
+    axes: [{ ...axisOf("time (s)"), label: null, values: seconds }, axisOf(`${terms()[2]} (µm)`)],
     series: [{}, seriesOf("residual", shade), seriesOf("low"), seriesOf("high")],
     bands: [bandOf(shade)],
     hooks: { draw: [zeroLine, (chart) => tell("drawn", chart)] },
@@ -32,12 +32,13 @@ function zeroLine(chart) {
   chart.ctx.beginPath(); chart.ctx.moveTo(left, y); chart.ctx.lineTo(left + width, y); chart.ctx.stroke();
   chart.ctx.restore();
 }
-listen("state", ({ model }) => {
-  if (at("residual_chart").hidden === !model) return;
-  at("residual_chart").hidden = at("worst").hidden = !model;
-  document.body.classList.toggle("modelled", Boolean(model));
+listen("state", ({ model, second }) => {
+  const compared = Boolean(model || second);
+  if (at("residual_chart").hidden === !compared) return;
+  at("residual_chart").hidden = at("worst").hidden = !compared;
+  document.body.classList.toggle("modelled", compared);
   makeChart();
-  if (model && !view.residual) make();
+  if (compared && !view.residual) make();
 });
 listen("charted", (from, scale) => {
   if (!view.residual || at("residual_chart").hidden) return;
@@ -51,12 +52,12 @@ function worst() {
     const size = gap === null || gaps.model[i] === null ? -1 : Math.abs(gap - gaps.model[i]);
     if (size > most) { most = size; place = i; }
   });
-  if (place < 0) { tell("message", "No frame has a residual yet.", "worst"); return; }
+  if (place < 0) { tell("message", `No frame has a ${terms()[1]} yet.`, "worst"); return; }
   goTo(place);
   if (page.state.playback) ask({ do: "seek", frame: gaps.frame[place] });
 }
 on("worst", "click", worst);
-key(["w"], "the frame at which the model is worst", () => (at("worst").hidden ? false : worst()));
+key(["w"], "the frame at which the model is worst, or two recordings differ most", () => (at("worst").hidden ? false : worst()));
 listen("start", () => {
   new ResizeObserver(() => { if (view.residual) { view.residual.setSize(sizeOf("residual_chart")); redraw(); } }).observe(at("residual_chart"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (view.residual) { make(); redraw(); } });

@@ -146,6 +146,8 @@ class Playback:
         """Function that is called with all rows whenever the table of the recording is complete."""
         self.on_stop: list[Callable[[], None]] = []
         """Functions that are called before the playback ends."""
+        self.companions: list[Playback] = []
+        """Recordings that are measured with the same settings."""
         self._told: Track | None = None
         self.is_playing, self.speed, self.frame = False, 1.0, 0
         self._messages = Messages()
@@ -253,8 +255,14 @@ class Playback:
         self.choices = chosen.for_frames(self.description)
         if unzeroed:
             self.say("zero", ZERO_IS_OFF)
+        for each in self.companions:
+            each.choose(**changes)
         if MOVES_ZERO & set(changes):
             self._measure_anew()
+
+    def renew(self) -> None:
+        """Send all rows to the browser pages again, because what stands beside them has changed."""
+        self._generation += 1
 
     # ---- data for the browser page
     @property
@@ -277,6 +285,11 @@ class Playback:
         self._messages.say(name, words)
 
     in_a_hurry = False
+
+    @property
+    def time_s(self) -> float:
+        """Time of the displayed frame (s)."""
+        return self._time_of(self.frame)
 
     @property
     def table(self) -> Path | None:
