@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from fingervision.cli._model_figures import draw_body, extent_mm, framed
+from fingervision.cli._model_figures import FigureStyle, draw_body, extent_mm, framed, save_figure
 from fingervision.cli._model_grip import part_of_pair, write_pair_grip
 from fingervision.cli._model_motion import MotionAsked, move
 from fingervision.cli._model_report import add_endurance, say_drawing, say_endurance, say_refusals, warn
 from fingervision.cli._model_sweep import solve_mechanism, sweep_mechanism, write_uncertainty
+from fingervision.domain.errors import UsageError
 from fingervision.interface.prediction import figures_csv, figures_text, naming, predict_mechanism
 from fingervision.models.answer_figures import Physics
 from fingervision.models.elastic_mechanism import MechanismState
@@ -36,7 +37,7 @@ the change."""
 
 
 def draw_deformed(model: MechanismPlate, state: MechanismState, path: Path, *, large: bool) -> None:
-    """Plot the deformed mechanism at one input, with displacements to scale and coloured by stress."""
+    """Plot the deformed mechanism at one input, coloured by stress or displacement."""
     plate = model.plate
     moved: NDArray[np.float64] = state.displacement_mm
     stress = plate.at_corners(plate.von_mises_mpa(moved, large=large))
@@ -44,14 +45,15 @@ def draw_deformed(model: MechanismPlate, state: MechanismState, path: Path, *, l
     stated = np.isfinite(state.stress_mpa)
     said = f"largest stress in a flexure {state.stress_mpa:.3g} MPa" if stated else "largest stress not stated"
     largest = state.stress_mpa if stated else float(np.percentile(stress, 99.0))
-    colours = draw_body(axes, plate, moved, stress, max(largest, 1e-9))
+    colours, label = draw_body(axes, plate, moved, stress, max(largest, 1e-9))
     axes.set_title(
-        f"{model.mechanism.name}: input {state.input_mm:.3g} mm, to scale, force {state.force_n:.3g} N\n"
+        f"{model.mechanism.name}: input {state.input_mm:.3g} mm, force {state.force_n:.3g} N, "
+        f"{FigureStyle.asked().words}\n"
         f"{said} (yield {model.mechanism.material.yield_mpa:g} MPa)",
         fontsize="medium",
     )
-    figure.colorbar(colours, ax=axes, label="von Mises stress / MPa", shrink=0.8)
-    figure.savefig(path, dpi=130)
+    figure.colorbar(colours, ax=axes, label=label, shrink=0.8)
+    save_figure(figure, path)
 
 
 def draw_over_input(mechanism: Mechanism, states: Mapping[str, Sequence[MechanismState]], path: Path) -> None:
@@ -84,7 +86,7 @@ def draw_over_input(mechanism: Mechanism, states: Mapping[str, Sequence[Mechanis
     for axes in (upper, middle, lower):
         axes.grid(alpha=0.3)
     upper.set_title(f"{mechanism.name}: over the input")
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path)
 
 
 def _beside(axes: Axes) -> None:
@@ -135,7 +137,8 @@ def predict(
         return
     with naming(path):
         mechanism = drawing.mechanism()
-    gripped = part_of_pair(object_mm, object_n_mm, mechanism)
+    gripped = part_of_pair(object_mm, object_n_mm, mechanism, kind)
+    _refuse_what_is_not_computed(mechanism, kind, asked)
     driven = None if drive is None else np.unique(read_drive(drive, columns).input_mm)
     physics = Physics(large_rotation=large_rotation, contact=contact)
     found = predict_mechanism(path, drawing, kind, driven, physics)
@@ -168,14 +171,7 @@ def predict(
         write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)
     bent = (large_rotation or contact) and asked.drive is not None
     curves = {name: _curve(states[name]) for name in models if bent}
-    if chief != "stiffness_matrix":
-        move(models, asked, mechanism.name, folders, out, static=curves, as_json=as_json)
-    elif asked.moves:
-        click.echo(
-            "The model kind stiffness_matrix has no masses and cannot compute motion: choose --kind lumped or "
-            "finite_element.",
-            err=True,
-        )
+    move(models, asked, mechanism.name, folders, out, static=curves, as_json=as_json)
     if gripped is not None:
         write_pair_grip(models, gripped, None if drive is None else inputs, out, as_json=as_json)
     if not as_json:
@@ -183,6 +179,19 @@ def predict(
     warn(mechanism, models[chief], states[chief], table[chief], contact=contact)
     for sentence in found.warnings:
         click.echo(f"Warning: {sentence}", err=True)
+
+
+def _refuse_what_is_not_computed(mechanism: Mechanism, kind: str, asked: MotionAsked) -> None:
+    """Refuse requests for which the drawing or the kind of model has no answer, before anything is computed."""
+    if kind == "stiffness_matrix" and asked.moves:
+        raise UsageError(
+            "The model kind stiffness_matrix has no masses and cannot compute motion: choose --kind lumped or "
+            "finite_element."
+        )
+    if asked.band is not None and not mechanism.probes:
+        raise UsageError(
+            f"--frequency needs a point whose motion is computed, but {mechanism.name} has none: add a [[probe]]."
+        )
 
 
 def _curve(states: Sequence[MechanismState]) -> PchipInterpolator:

@@ -1,9 +1,11 @@
 """Plots of the `model` command: bodies with their stress, and the gap over the input with differences."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+import click
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
+from fingervision.diagnosis.report.vector_figure import write_vector
 from fingervision.models import reference_mesh
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.plane_stress import PlaneStressPlate
@@ -28,6 +31,44 @@ _ON_AXIS = 1e-9
 """Tolerance relative to the size of the body: edges that are nearer to the symmetry axis lie on the axis."""
 _COLOURS = "YlOrRd"
 """Colour map that is pale at zero stress, so that the shape of the body remains visible."""
+
+
+@dataclass(frozen=True, slots=True)
+class FigureStyle:
+    """What a user asks of figures.
+
+    Parameters
+    ----------
+    magnify : float
+        Factor by which displacements are drawn larger.
+    colour : str
+        What colours a deformed body: `stress` or `displacement`.
+    vector : bool
+        Whether every figure is also written as SVG and PDF.
+    """
+
+    magnify: float = 1.0
+    colour: str = "stress"
+    vector: bool = False
+
+    @classmethod
+    def asked(cls) -> "FigureStyle":
+        """Return the style that the options of the running command ask for."""
+        context = click.get_current_context(silent=True)
+        given = {} if context is None else context.params
+        return cls(**{each.name: given[each.name] for each in fields(cls) if each.name in given})
+
+    @property
+    def words(self) -> str:
+        """Scale of the displacements, for a title."""
+        return "to scale" if self.magnify == 1.0 else f"displacements times {self.magnify:g}"
+
+
+def save_figure(figure: Figure, path: Path, dpi: int = 130) -> None:
+    """Write a figure as PNG, and as SVG and PDF beside it if they are asked for."""
+    figure.savefig(path, dpi=dpi)
+    if FigureStyle.asked().vector:
+        write_vector(figure, path.with_suffix(""))
 
 
 def framed(low: Array, high: Array) -> tuple[Figure, Axes]:
@@ -51,8 +92,8 @@ def framed(low: Array, high: Array) -> tuple[Figure, Axes]:
 
 def draw_body(
     axes: Axes, plate: PlaneStressPlate, moved: Array, stress: Array, top_mpa: float, *, side: float | None = None
-) -> Any:
-    """Draw a body's outline at rest and its deformed shape coloured by stress; return the data for a colour bar.
+) -> tuple[Any, str]:
+    """Draw a body's outline at rest and its deformed shape in colours; return the data for a colour bar and its label.
 
     Parameters
     ----------
@@ -61,7 +102,7 @@ def draw_body(
     plate : PlaneStressPlate
         The meshed body.
     moved : ndarray of float, shape (unknowns,)
-        Displacements in mm, drawn to scale.
+        Displacements in mm, drawn with the magnification that is asked for.
     stress : ndarray of float, shape (corners,)
         Von Mises stress at the corners, in MPa.
     top_mpa : float
@@ -72,7 +113,12 @@ def draw_body(
         complete body.
     """
     x, y = plate.nodes_mm
-    u, v = moved[plate.x_dofs], moved[plate.y_dofs]
+    style = FigureStyle.asked()
+    u, v = style.magnify * moved[plate.x_dofs], style.magnify * moved[plate.y_dofs]
+    colour, top, label = stress, top_mpa, "von Mises stress / MPa"
+    if style.colour == "displacement":
+        colour, label = np.hypot(u, v)[: stress.size] / style.magnify, "displacement / mm"
+        top = max(float(colour.max()), 1e-12)
     ends = plate.outline_edges[[0, 2, 1]]
     if side is not None:
         ends = ends[:, np.abs(x[ends]).max(axis=0) > _ON_AXIS * np.ptp(plate.nodes_mm)]
@@ -82,16 +128,18 @@ def draw_body(
     # All edges are one collection: a separate line for each edge would take longer than the finite elements.
     axes.add_collection(LineCollection(list(at_rest), colors="0.6", linewidths=0.6, zorder=1))
     shape = Triangulation(side * (x + u)[:count], (y + v)[:count], np.asarray(plate.corner_triangles).T)
-    colours = axes.tripcolor(shape, stress, shading="gouraud", cmap=_COLOURS, vmin=0.0, vmax=top_mpa, zorder=2)
+    colours = axes.tripcolor(
+        shape, colour, shading="gouraud", cmap=_COLOURS, vmin=0.0, vmax=top, zorder=2, rasterized=True
+    )
     axes.add_collection(LineCollection(list(there), colors="0.2", linewidths=0.6, zorder=3))
     axes.autoscale_view()
-    return colours
+    return colours, label
 
 
 def extent_mm(plate: PlaneStressPlate, moved: Array, *, mirrored: bool = False) -> tuple[Array, Array]:
     """Bounding box that contains a body both at rest and deformed, in mm."""
     at_rest = plate.nodes_mm
-    there = at_rest + np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
+    there = at_rest + FigureStyle.asked().magnify * np.stack([moved[plate.x_dofs], moved[plate.y_dofs]])
     both = np.hstack([at_rest, there])
     if mirrored:
         both = np.hstack([both, both * np.array([[-1.0], [1.0]])])
@@ -121,28 +169,30 @@ def draw_deformed(model: FiniteElementGripper, input_mm: float, name: str, path:
     stress = plate.at_corners(plate.von_mises_mpa(moved, large=model.physics.large_rotation))
     figure, axes = framed(*extent_mm(plate, moved, mirrored=True))
     for side in (1.0, -1.0):
-        colours = draw_body(axes, plate, moved, stress, max(state.stress_mpa, 1e-9), side=side)
+        colours, label = draw_body(axes, plate, moved, stress, max(state.stress_mpa, 1e-9), side=side)
     limit_mpa = model.gripper.material.yield_mpa
     touch = " (first touch; no contact force is computed beyond it)" if beyond else ""
     grip = f", grip {state.grip_n:.3g} N a finger" if state.grip_n > 0.0 else ""
     axes.set_title(
-        f"{name}: input {input_mm:.3g} mm{touch}, to scale{grip}\nlargest stress on a notch {state.stress_mpa:.3g} MPa "
+        f"{name}: input {input_mm:.3g} mm{touch}, {FigureStyle.asked().words}{grip}\n"
+        f"largest stress on a notch {state.stress_mpa:.3g} MPa "
         f"at x = {state.place_mm[0]:.3g}, y = {state.place_mm[1]:.3g} mm (yield {limit_mpa:g} MPa)"
     )
-    figure.colorbar(colours, ax=axes, label="von Mises stress / MPa", shrink=0.8)
-    figure.savefig(path, dpi=130)
+    figure.colorbar(colours, ax=axes, label=label, shrink=0.8)
+    save_figure(figure, path)
 
 
 def draw_mesh(mesh: PlaneMesh, name: str, path: Path) -> None:
     """Plot the triangles of the mesh, with their number and quality in the title."""
     figure, axes = framed(mesh.nodes_mm.min(axis=1), mesh.nodes_mm.max(axis=1))
-    axes.triplot(Triangulation(mesh.nodes_mm[0], mesh.nodes_mm[1], mesh.triangles[:3].T), color="0.3", linewidth=0.25)
+    shape = Triangulation(mesh.nodes_mm[0], mesh.nodes_mm[1], mesh.triangles[:3].T)
+    axes.triplot(shape, color="0.3", linewidth=0.25, rasterized=True)
     quality = mesh.quality()
     axes.set_title(
         f"{name}: {mesh.triangles.shape[1]} quadratic triangles, {2 * mesh.nodes_mm.shape[1]} unknowns\n"
         f"quality {quality.min():.2f} at least, {quality.mean():.2f} in the mean (1: equilateral)"
     )
-    figure.savefig(path, dpi=200)
+    save_figure(figure, path, dpi=200)
 
 
 def draw_comparison(tables: Mapping[str, Mapping[str, Array]], name: str, path: Path, *, with_published: bool) -> None:
@@ -182,4 +232,4 @@ def draw_comparison(tables: Mapping[str, Mapping[str, Array]], name: str, path: 
     lower.grid(alpha=0.3)
     chosen = "; one link length was fitted to this slope: no validation" if with_published else ""
     upper.set_title(f"{name}{chosen}", fontsize="medium")
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path)

@@ -15,7 +15,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from scipy.signal import find_peaks
 
+from fingervision.cli._model_figures import save_figure
 from fingervision.domain.errors import OutputError, UsageError
 from fingervision.models.damping import parse_damping
 from fingervision.models.kinds import by_trust
@@ -33,6 +35,8 @@ from fingervision.models.motion_in_time import MODES
 from fingervision.storage.row_file import write_table
 
 _MOST_MODES = 60
+_LEAST_PEAK = 0.01
+"""Least rise of a peak that is told, as a share of the response: a probe at the drive moves as the drive does."""
 _LEAST_RANGE, _LEAST_DEG = 1.1, 1.0
 """Least range of the axes, as a ratio and in degrees."""
 _STYLES = ("-", "--", "-.")
@@ -137,7 +141,7 @@ def _peaks_of(answer: FrequencyResponse, column: str) -> str:
     ):  # fmt: skip
         size = np.abs(curve)
         unit = "mm/mm" if what == "per input" else "mm/N"
-        at = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+        at, _ = find_peaks(np.log(size), prominence=_LEAST_PEAK)
         tops = ", ".join(f"{size[i]:.4g} {unit} at {answer.frequency_hz[i]:.4g} Hz" for i in at[:4]) or "no peak"
         words.append(f"{column.removesuffix('_mm')} {what}: {tops}")
     return "; ".join(words)
@@ -171,6 +175,14 @@ def _draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title
         ):  # fmt: skip
             axes.semilogy(answer.frequency_hz, np.abs(curve), label=kind, **style)
             phases.plot(answer.frequency_hz, np.degrees(np.unwrap(np.angle(curve))), **style)
+    main = next(iter(found.values()))
+    for panels, modes in (((upper, lower), main.modes_hz), ((upper_force, lower_force), main.free_modes_hz)):
+        for at in modes[(modes >= main.frequency_hz[0]) & (modes <= main.frequency_hz[-1])]:
+            for axes in panels:
+                # Also modes of parts that no probe observes, such as an intermediate stage.
+                axes.axvline(at, color="0.6", linewidth=0.6, linestyle=":", zorder=1)
+        panels[1].plot([], [], color="0.6", linewidth=0.6, linestyle=":", label="natural frequency")
+        panels[1].legend(fontsize="small")
     upper.set_title("drive moved by a stiff stage", fontsize="medium")
     upper.set_ylabel(f"{label} per input / (mm/mm)")
     upper_force.set_title("drive pushed by a force, free to move", fontsize="medium")
@@ -191,7 +203,7 @@ def _draw_frequencies(found: Mapping[str, FrequencyResponse], column: str, title
         axes.grid(alpha=0.3, which="both")
     upper.legend()
     figure.suptitle(title)
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path)
 
 
 def main_column(reduced: ModalModel, name: str) -> str:
@@ -242,7 +254,7 @@ def write_modes(found: Mapping[str, Sequence[ModeShape]], name: str, out: Path, 
         return
     title = f"{name}: natural modes in the plane, without the actuator's mass, arbitrary amplitudes"
     figure, _ = _panels(drawn, title)
-    figure.savefig(out / "modes.png", dpi=110)
+    save_figure(figure, out / "modes.png", dpi=110)
     if film:
         _film(drawn[:_MOST_FILM_MODES], title, out / "modes.mp4")
         if len(drawn) > _MOST_FILM_MODES and not as_json:

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fingervision.cli._model_figures import save_figure
 from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import MechanismPlate
@@ -90,16 +91,24 @@ class PartOfPair:
     pair: str
 
 
-def part_of_pair(width_mm: float | None, stiffness_n_mm: float | None, mechanism: Mechanism) -> PartOfPair | None:
+def part_of_pair(
+    width_mm: float | None, stiffness_n_mm: float | None, mechanism: Mechanism, kind: str
+) -> PartOfPair | None:
     """Read and check the gripped part, and find the pair of probes that grips it: the pair named gap, or the only pair.
 
     Raises
     ------
     UsageError
-        The width or the stiffness of the part is not positive, or the drawing has no such pair.
+        The width or the stiffness of the part is not positive, the drawing has no such pair, or the kind of model does
+        not compute it.
     """
     if width_mm is None and stiffness_n_mm is None:
         return None
+    if kind not in (MechanismPlate.kind, "all"):
+        raise UsageError(
+            f"A part between probes (--object-mm) is computed by finite elements only, but --kind is {kind}: choose "
+            "--kind finite_element."
+        )
     pairs = mechanism.pairs
     name = "gap" if "gap" in pairs else next(iter(pairs), "")
     if not pairs or (name != "gap" and len(pairs) > 1):
@@ -118,10 +127,7 @@ def write_pair_grip(
 ) -> None:
     """Write grip.csv and grip.png for the finite elements of a mechanism, and print how the part is held."""
     plate = models.get("finite_element")
-    if not isinstance(plate, MechanismPlate):
-        click.echo(
-            "A part between probes can be computed by finite elements only: add --kind finite_element.", err=True
-        )
+    if not isinstance(plate, MechanismPlate):  # it was refused with its reason
         return
     held, part = GrippedPair(plate, asked.pair), asked.part
     touch = held.touch_input_mm(part)
@@ -216,4 +222,4 @@ def _draw(rows: Mapping[str, NDArray[np.float64]], part: Part, name: str, path: 
     upper.legend()
     for axes in (upper, lower):
         axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from fingervision.cli._model_figures import save_figure
 from fingervision.cli._model_frequency import Band, answer_frequencies, main_column, moving, parse_band
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import UsageError
@@ -249,7 +250,7 @@ def draw_motion(
     panels[-1].set_xlabel("time / s")
     dots = "; dots: rows of the drive" if next(iter(motions.values())).drive.time_s.size <= _SEEN_ROWS else ""
     panels[0].set_title(f"{title}{dots}", fontsize="medium")
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path)
 
 
 def _curves(motion: Motion, column: str) -> tuple[Array, Array, Array]:

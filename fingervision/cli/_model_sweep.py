@@ -14,6 +14,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fingervision.cli._model_figures import save_figure
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.numbers import with_uncertainty
 from fingervision.models.finite_element import FiniteElementGripper, MechanismPlate
@@ -171,7 +172,7 @@ def _draw(
     if len(variations) > 1:
         label = f"{variations[0].name} / {number_unit(variations[0].name)}"
         figure.colorbar(ScalarMappable(scale, colours), ax=list(grid), label=label)
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path)
 
 
 _LEFT_OUT = ("peak_x_mm", "peak_y_mm", "lowest_input_mm", "highest_input_mm")
@@ -261,4 +262,4 @@ def _draw_shares(
     axes.set_title(f"{title}, standard uncertainties", fontsize="medium")
     if inputs:
         axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(path, dpi=130)
+    save_figure(figure, path)

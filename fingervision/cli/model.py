@@ -12,8 +12,11 @@ if TYPE_CHECKING:
     from fingervision.domain.gripper import Gripper
     from fingervision.interface.prediction import GripperPrediction
 
-_SWEPT = ("vary.csv", "vary.png", "solve.csv")
+_SWEPT = ("vary.csv", "vary.png", "solve.csv", "vary.svg", "vary.pdf")
 _PREDICTED = (
+    *(f"{name}.{ending}" for ending in ("svg", "pdf") for name in (
+        "models", "deformed", "mesh", "modes", "frequency", "grip", "response", "uncertainty",
+    )),
     "models.csv", "models.png", "simulation.csv", "mechanism.csv", "deformed.png", "mesh.png", "modes.csv", "modes.png",
     "frequency.csv", "frequency.png", "grip.csv", "grip.png", "response.csv", "response.png", "uncertainty.csv",
     "uncertainty.png", "modes.mp4",
@@ -141,11 +144,28 @@ Examples:
 @option(
     "--export",
     multiple=True,
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=FILE,
     metavar="FILE",
     group=OUTPUT,
     help="Write the outline as .dxf or .svg, or the plate as .stl (mm), and compute nothing (repeatable).",
 )
+@option(
+    "--magnify",
+    type=NUMBER,
+    default=1.0,
+    show_default=True,
+    group=OUTPUT,
+    help="Factor by which displacements are drawn larger in deformed.png.",
+)
+@option(
+    "--colour",
+    type=click.Choice(["stress", "displacement"]),
+    default="stress",
+    show_default=True,
+    group=OUTPUT,
+    help="Colour of the bodies in deformed.png.",
+)
+@option("--vector", is_flag=True, group=OUTPUT, help="Write every figure for a paper too, as .svg and .pdf.")
 @option("--mesh", is_flag=True, group=OUTPUT, help="Write a picture of the finite-element mesh, mesh.png.")
 @json_option("Print the table as JSON.")
 def command(
@@ -165,6 +185,9 @@ def command(
     object_mm: float | None,
     object_n_mm: float | None,
     export: tuple[Path, ...],
+    magnify: float,
+    colour: str,
+    vector: bool,
     mesh: bool,
     vary: tuple[str, ...],
     solve: tuple[str, ...],
@@ -187,6 +210,7 @@ def command(
     from fingervision.cli._model_grip import part_asked, write_grip
     from fingervision.cli._model_motion import motion_asked, move
     from fingervision.cli._model_report import say_refusals, say_what_limits
+    from fingervision.domain.errors import UsageError
     from fingervision.interface.prediction import figures_csv, figures_text, predict_gripper
     from fingervision.models.answer_figures import Physics
     from fingervision.models.hinge_correction import HingeTheory
@@ -196,6 +220,9 @@ def command(
     from fingervision.storage.out_folder import began_in, finish_in, make_out_folder
     from fingervision.tables.read import read_drive
 
+    if not magnify > 0.0:
+        raise UsageError(f"--magnify must be a positive factor, but is {magnify:g}.")
+    del colour, vector  # read where figures are drawn (`FigureStyle`)
     asked = motion_asked(drive, columns, modes, frequency, damping, rate_hz, film=film)
     if export or gripper_toml.suffix.lower() in (".dxf", ".svg"):
         from fingervision.cli import _outline
