@@ -3,6 +3,7 @@
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Lock
 from time import monotonic
 from typing import Any
@@ -16,6 +17,8 @@ from fingervision.domain.status import Status
 from fingervision.live.commands import section
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.page_words import page_json
+from fingervision.live.playback.playback import Playback
+from fingervision.live.playback.saved_page import MOST_BYTES, saved_page, seen_at
 from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.overlay import in_eight_bits
@@ -175,6 +178,29 @@ def coded(seen: Seen) -> bytes:
     if levels.ndim == 2:
         return bytes(simplejpeg.encode_jpeg(levels[:, :, np.newaxis], JPEG_QUALITY, "GRAY", fastdct=True))
     return bytes(simplejpeg.encode_jpeg(np.asarray(levels, np.uint8), JPEG_QUALITY, "RGB", "420", fastdct=True))
+
+
+def page_file(view: Playback, frames: Sequence[int], folder: Path) -> str:
+    """The page as one file, with all rows and the pictures of some frames, as far as there is room for them.
+
+    Raises
+    ------
+    StateError
+        The recording is moved by another page meanwhile.
+    """
+    shown, pictures, room = view.frame, list[tuple[dict[str, Any], bytes]](), MOST_BYTES
+    for frame in frames:
+        seen = seen_at(view, frame)
+        picture = coded(seen)
+        room -= len(picture)
+        if room < 0:
+            break
+        pictures.append(({"now": _now(view, seen), "overlay": _overlay(seen.outcome)}, picture))
+    view.seek(shown)
+    state = {**view.state(), **section(view), "gauges": None, "viewer": True, "holds_pen": False, "is_saved": True}
+    told = [[each.number, each.name, each.words] for each in view.messages]
+    rows = list(view.rows(0, view.row_count))
+    return saved_page(folder, {"state": state, "points": points(view, rows), "messages": told}, pictures)
 
 
 def draw_beforehand(view: View) -> None:

@@ -25,11 +25,12 @@ from fingervision.live.access import Access
 from fingervision.live.commands import modules
 from fingervision.live.commands.model import MODEL
 from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard, PatientProtocol
-from fingervision.live.page_socket import TRY_AGAIN_LATER, PageSocket
+from fingervision.live.page_socket import ONLY_LOOKS, TRY_AGAIN_LATER, PageSocket
 from fingervision.live.pen import Pen
 from fingervision.live.picture_watch import PictureWatch
+from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.second_recording import SECOND
-from fingervision.live.preview import coded
+from fingervision.live.preview import coded, page_file
 from fingervision.live.supervisor import sentence
 from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapsCsv
@@ -125,6 +126,8 @@ MESSAGE_BYTES = 4096
 PAGES_AT_ONCE, CONNECTIONS_AT_ONCE = 32, 128
 DOOR = ".live_page.html"
 SERVING = "Serving the page"
+# Numbers of the frames whose pictures a saved page contains.
+FRAMES = re.compile(r"\d{1,9}(,\d{1,9}){0,40}")
 
 
 def bound(host: str, port: int) -> socket.socket:
@@ -189,6 +192,7 @@ class Page:
                 Route("/steps/{number}.png", self._step),
                 Route("/verdict/{name}", self._verdict),
                 Route("/second.jpg", self._second),
+                Route("/saved.html", self._saved),
                 WebSocketRoute("/socket", self._socket),
             ],
             exception_handlers={Exception: self._failed},
@@ -279,6 +283,20 @@ class Page:
         if second is None or second.seen is None:
             return PlainTextResponse("There is no picture of a second recording.", 404)
         return Response(await asyncio.to_thread(coded, second.seen), media_type="image/jpeg")
+
+    async def _saved(self, request: Request) -> Response:
+        """Send the page of a recording as one file, with the pictures of the frames that are asked for."""
+        view, asked = self._view, request.query_params.get("frames", "")
+        if not isinstance(view, Playback) or not FRAMES.fullmatch(asked):
+            return PlainTextResponse("There is no recording whose page could be saved with these frames.", 404)
+        if request.scope.get("role") != WRITER:  # the recording is moved from frame to frame
+            return PlainTextResponse(ONLY_LOOKS, 403)
+        frames = sorted({min(int(frame), view.frame_count - 1) for frame in asked.split(",")})
+        try:
+            text = await asyncio.to_thread(page_file, view, frames, PAGE)
+        except FingervisionError as error:
+            return PlainTextResponse(str(error), 500)
+        return HTMLResponse(text, headers={"Content-Disposition": 'attachment; filename="fingervision.html"'})
 
     async def _socket(self, page: WebSocket) -> None:
         if len(self._sockets) >= PAGES_AT_ONCE:

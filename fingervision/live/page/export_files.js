@@ -1,10 +1,11 @@
 // The table as CSV, and what is seen of the chart as SVG, PNG and CSV.
-import { at, colour, download, on, page, tell, withToken } from "/page/bus.js";
+import { at, colour, download, listen, on, page, tell, withToken } from "/page/bus.js";
 import { view } from "/page/chart.js";
 import { svg } from "/page/export_svg.js";
 import { gaps, terms } from "/page/gap_data.js";
+import { marks } from "/page/time_ruler.js";
 
-const KEPT_MS = 60000, PNG_SCALE = 2;
+const MOST_PICTURES = 21, KEPT_MS = 60000, PNG_SCALE = 2;
 const seenTimes = () => [view.chart.scales.x.min, view.chart.scales.x.max];
 function save(content, kind, name, words) {
   const address = URL.createObjectURL(new Blob([content], { type: kind }));
@@ -18,6 +19,14 @@ function title() {
 }
 const drawn = () => svg(title(), view.chart.data, at("residual_chart").hidden || !view.residual ? null : view.residual.data, seenTimes());
 on("save_csv", "click", () => download(withToken("/gaps.csv"), "gaps.csv"));
+// The page itself, with the pictures of what the ruler marks, the frame shown, and the ends.
+on("save_page", "click", () => {
+  const { frame, frames } = page.state.playback, found = marks(), every = Math.ceil(found.length / MOST_PICTURES);
+  const wanted = new Set([0, frame, ...found.filter((_, i) => i % every === 0), frames - 1]);
+  tell("message", `The page is saved with ${wanted.size} pictures, which are read from the recording now.`, "saved");
+  download(withToken(`/saved.html?frames=${[...wanted].sort((a, b) => a - b).join(",")}`), "fingervision.html");
+});
+listen("state", ({ playback }) => { at("save_page").hidden = !playback; });
 on("save_svg", "click", () => save(drawn(), "image/svg+xml", "gap.svg", "The plot was saved as it is shown,"));
 on("save_plot", "click", async () => {
   const picture = new Image(), address = URL.createObjectURL(new Blob([drawn()], { type: "image/svg+xml" })), sheet = document.createElement("canvas");

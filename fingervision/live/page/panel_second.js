@@ -24,9 +24,9 @@ function picture(second) {
   at("second_picture").src = withToken(wanted);
 }
 for (const end of ["load", "error"]) at("second_picture").addEventListener(end, () => { loading = false; });
-listen("state", ({ second, px_per_mm: first_scale }) => {
+listen("state", ({ second, is_saved: saved }) => {
   at("beside").hidden = !second;
-  if (!second) return;
+  if (!second || saved) return;
   say("second_source", second.source.split(/[/\\]+/).filter(Boolean).slice(-2).join("/"));
   at("second_source").title = second.source;
   picture(second);

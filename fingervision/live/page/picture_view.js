@@ -1,12 +1,30 @@
 // Zoom and pan of the picture: by wheel, pinch, drag, buttons and keys. The stage is laid out larger, not transformed, so
 // that lines and letters drawn over it keep their width at any zoom.
-import { at, listen, on, say, tell } from "/page/bus.js";
+import { at, listen, on, page, say, tell } from "/page/bus.js";
 import { key } from "/page/keys.js";
 
 const STEP = 1.5, MOST = 40, WHEEL = 0.0015, PAN_SHARE = 0.15, CRISP_PX = 3;
 // `x` and `y` are the place of the picture (0 to 1 in each direction) that stands in the middle of its frame.
 export const seen = { zoom: 1, x: 0.5, y: 0.5 };
 const stage = () => at("stage"), clamp = (value, low, high) => Math.min(high, Math.max(low, value));
+
+// Show a picture (a JPEG file) with what was measured in it.
+export async function draw(bytes, overlay) {
+  const canvas = at("picture");
+  try {
+    const picture = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
+    if (canvas.width !== picture.width || canvas.height !== picture.height) {
+      canvas.width = picture.width;
+      canvas.height = picture.height;
+    }
+    at("stage").style.setProperty("--aspect", String(picture.width / picture.height));
+    canvas.getContext("2d").drawImage(picture, 0, 0);
+    picture.close();
+    page.overlay = overlay; // of this picture, and of no other
+    canvas.dataset.shown = String(Number(canvas.dataset.shown || 0) + 1);
+    tell("picture");
+  } catch { tell("message", "A picture could not be shown.", "picture"); }
+}
 
 // Screen pixels of one pixel of the picture.
 export const scale = () => stage().clientWidth / at("picture").width;

@@ -1,5 +1,6 @@
 // One socket, one acknowledgement a message: the server sends the newest, and nothing queues.
-import { at, page, listen, say, sendBy, tell, token } from "/page/bus.js";
+import { page, listen, say, sendBy, tell, token } from "/page/bus.js";
+import { draw } from "/page/picture_view.js";
 
 const AGAIN_AFTER_MS = 500, SILENT_MS = 1000;
 let socket = null, lastAt = 0, view = "", rows = 0, said = 0, goneAt = 0, fresh = true, drawing = false;
@@ -68,23 +69,6 @@ async function take(buffer) {
     if (!page.paused) tell("now", head.now);
   }
   if (socket.readyState === WebSocket.OPEN) socket.send('{"do":"ack"}');
-}
-
-async function draw(bytes, overlay) {
-  const canvas = at("picture");
-  try {
-    const picture = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
-    if (canvas.width !== picture.width || canvas.height !== picture.height) {
-      canvas.width = picture.width;
-      canvas.height = picture.height;
-    }
-    at("stage").style.setProperty("--aspect", String(picture.width / picture.height));
-    canvas.getContext("2d").drawImage(picture, 0, 0);
-    picture.close();
-    page.overlay = overlay; // of this picture, and of no other
-    canvas.dataset.shown = String(Number(canvas.dataset.shown || 0) + 1);
-    tell("picture");
-  } catch { tell("message", "A picture could not be shown.", "picture"); }
 }
 
 function answer(reply) {
