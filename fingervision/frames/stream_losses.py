@@ -1,6 +1,7 @@
 """Detect lost packets of a stream from the received packets, in addition to reports of the container reader."""
 
 from collections import deque
+from collections.abc import Iterator
 from contextlib import suppress
 from statistics import median
 
@@ -20,6 +21,9 @@ STEPS = 8
 LEAP_SHARE = 1.5
 # Smallest number of frame numbers that H.264 allows (log2_max_frame_num_minus4 = 0).
 LEAST_BITS = 4
+# Start code between units (ITU-T H.264, B.1), fields of a unit's first byte (7.3.1), and kinds of units that are slices
+# of a picture (7.4.1). The fields of a slice's header up to its picture's number take less than the bytes stated.
+START, REFERENCE, KIND, SLICES, HEADER_BYTES = b"\0\0\1", 0x60, 0x1F, (1, 5), 24
 
 
 class StreamLosses:
@@ -72,9 +76,11 @@ class FrameNumbers:
     """Checks the frame numbers of H.264 pictures in decoding order (ITU-T H.264, 7.4.3, `frame_num`).
 
     A decoder that misses a picture adds the differences of the next picture to whichever picture came before, which it
-    mentions only in its log for developers. Pictures on which no other picture depends (mostly B pictures) have no
-    number of their own, and may be missing without damage to other pictures. HEVC needs no check of frame numbers: its
-    pictures name their reference pictures, and FFmpeg reports missing ones.
+    mentions only in its log for developers. Pictures on which no other picture depends (mostly B pictures) have the
+    number that the next reference picture has, and may be missing without damage to other pictures. FFmpeg compares a
+    number with that of the picture before, so that it misses a lost reference picture behind a picture that bears the
+    same number: this is told from the numbers themselves. HEVC needs no check of frame numbers: its pictures name
+    their reference pictures, and FFmpeg reports missing ones.
 
     After a reset (a key frame) or a full cycle of numbers the numbers are the same: such a loss shows in the times
     only. A camera that halves its rate in the dark leaves the same gap in the times at any picture; only where a key
@@ -100,6 +106,13 @@ class FrameNumbers:
             self._headers = BitStreamFilterContext("trace_headers", stream)
         stated = _fields(log)
         self._modulus = 1 << stated.get("log2_max_frame_num_minus4", 0) + LEAST_BITS
+        self._before_number = 2 if stated.get("separate_colour_plane_flag") else 0  # bits, colour_plane_id
+        extradata = stream.codec_context.extradata or b""
+        # Bytes of the length before each unit, as `avcC` states it; 0 if start codes separate the units.
+        self._length_bytes = 1 + (extradata[4] & 3) if len(extradata) > 4 and extradata[0] == 1 else 0
+        self._reference: int | None = None
+        # Number that the next reference picture has, by a picture on which no other depends.
+        self._announced: int | None = None
         # Whether the stream allows gaps in the numbers (removed temporal layers).
         self._may_leap = stated.get("gaps_in_frame_num_allowed_flag") == 1
 
@@ -113,8 +126,9 @@ class FrameNumbers:
                 self._key_every = min(self._key_every or self._since_key, self._since_key)
             self._since_key, self._has_seen_key = 0, True
         hides = missing and not packet.is_keyframe
+        has_leapt = self._announced_is_missing(packet) or heard.has_leapt
         # If the stream allows gaps in the numbers, pictures are missing only if the times have a gap as well.
-        if (heard.has_leapt and (missing or not self._may_leap)) or (
+        if (has_leapt and (missing or not self._may_leap)) or (
             hides and self._may_hide(packet, missing, is_due, heard)
         ):
             trail.lacks(LOST_REFERENCE)
@@ -122,6 +136,24 @@ class FrameNumbers:
             self._follow_recovery(packet, heard, trail)
         else:
             self._recovering = None
+
+    def _announced_is_missing(self, packet: "av.Packet[av.VideoStream]") -> bool:
+        """Whether the reference picture did not come that a picture with its number announced."""
+        found = first_slice(bytes(packet), self._length_bytes)
+        if found is None:
+            return False
+        unit, bits = found
+        for _ in range(3):  # first_mb_in_slice, slice_type, pic_parameter_set_id
+            bits = bits[2 * bits.find("1") + 1 :]
+        digits = bits[self._before_number :][: self._modulus.bit_length() - 1]
+        if not digits:
+            return False
+        number, announced = int(digits, 2), self._announced
+        if unit & REFERENCE:
+            self._reference, self._announced = number, None
+        elif number != self._reference:  # a second field has the number of the first
+            self._announced = number
+        return announced is not None and number == (announced + 1) % self._modulus
 
     def _may_hide(self, packet: "av.Packet[av.VideoStream]", missing: int, is_due: bool, heard: Heard) -> bool:
         """Whether as many pictures may be missing as make the numbers agree again."""
@@ -166,6 +198,38 @@ class FrameNumbers:
         found = _fields(heard.log)
         heard.log.clear()
         return found
+
+
+def first_slice(coded: bytes, length_bytes: int) -> tuple[int, str] | None:
+    """First byte of the first slice's unit in a coded picture of H.264, and the bits of its header; None without one.
+
+    Parameters
+    ----------
+    coded : bytes
+        The coded picture.
+    length_bytes : int
+        Bytes of the length before each unit; 0 if start codes separate the units.
+    """
+    for begin in _units(coded, length_bytes):
+        if coded[begin] & KIND in SLICES:
+            head = coded[begin + 1 :][:HEADER_BYTES].replace(b"\0\0\3", b"\0\0")
+            return coded[begin], f"{int.from_bytes(head, 'big'):0{8 * len(head)}b}"
+    return None
+
+
+def _units(coded: bytes, length_bytes: int) -> Iterator[int]:
+    """Yield where the units of a coded picture begin."""
+    at = 0
+    while at < len(coded) - 1:
+        if length_bytes:
+            begin = at + length_bytes
+            at = begin + int.from_bytes(coded[at:begin], "big")
+        else:
+            at = begin = coded.find(START, at) + len(START)
+            if begin < len(START):
+                return
+        if begin < len(coded):
+            yield begin
 
 
 def _fields(log: list[tuple[int, str, str]]) -> dict[str, int]:

@@ -1,8 +1,8 @@
 """Refuse the measurement of a frame that the frames before and after it contradict.
 
 A finger is a body: between two frames it moves, rotates and bends a little, at any speed, but it keeps its width and
-its outline. Both fingers are held by one frame, so that along their own direction neither moves without the other by
-more than it moves across. Wrong content in a picture (a page of memory that was not written again, a lost packet that
+its outline, and where it has gone, the ground is seen. Both fingers are held by one frame, so that along their own
+direction neither moves without the other by more than it moves across. Wrong content in a picture (a page of memory that was not written again, a lost packet that
 no checksum covers, an object that passes) has other outlines, or tears the picture between two rows. A jump of the
 measuring points alone proves nothing, because stages make steps and springs vibrate; nor does another outline alone,
 because parts come and go. A measurement is refused if its measuring points jump, the fingers there have not the
@@ -72,10 +72,16 @@ class _Look:
         Inner and outer side relative to the measuring point, in bands from there towards the root; NaN where unseen.
     beyond : ndarray, shape (bands beyond the tip,)
         Share of the pixels straight beyond the tip that look like the finger, in bands from the tip outwards.
+    level : float
+        Grey level of the edge.
+    ends_px : tuple of int
+        First pixel across the finger, and that behind its last; equal if the finger is not followed.
     """
 
     sides_px: Floats
     beyond: Floats
+    level: float
+    ends_px: tuple[int, int]
 
     @property
     def is_comparable(self) -> bool:
@@ -192,7 +198,33 @@ def _is_alike(first: _Seen, second: _Seen) -> bool:
     u_along_px = hypot(*(seen.positions[k][1] for seen in (first, second) for k in (2, 3)))
     if abs(along_px[1] - along_px[0]) > JUMP_U * u_along_px + MOST_BENT_PX + max(moved_px[:2]):
         return False
-    return abs(first.torn_share - second.torn_share) <= TORN_SHARE
+    return not (
+        abs(first.torn_share - second.torn_share) > TORN_SHARE
+        or _shows_two_places(first, second)
+        or _shows_two_places(second, first)
+    )
+
+
+def _shows_two_places(now: _Seen, other: _Seen) -> bool:
+    """Whether a picture shows, beside its own fingers, a tip where a finger has it in another picture."""
+    upright = other.gap.direction.is_vertical
+    pixels = now.frame.pixels if upright else now.frame.pixels.swapaxes(0, 1)
+    for finger, look in zip(other.fingers, other.looks, strict=True):
+        columns = np.arange(*look.ends_px)
+        for own in now.looks:
+            columns = columns[(columns < own.ends_px[0] - BAND_PX) | (columns > own.ends_px[1] + BAND_PX)]
+        towards_root = (finger.y_px if upright else finger.x_px) > finger.tip_px
+        first = round(finger.tip_px) - (0 if towards_root else BAND_PX)
+        tip = pixels[max(0, first) : first + BAND_PX, columns]
+        if columns.size >= BAND_PX and tip.size and np.mean(_is_like(tip, now.gap, now.looks[0].level)) > 0.5:
+            return True
+    return False
+
+
+def _is_like(pixels: NDArray[Any], gap: GapMeasurement, level: float) -> NDArray[np.bool_]:
+    """Which pixels have a finger's grey level rather than that of the ground."""
+    grey = to_grey(np.ascontiguousarray(pixels))
+    return np.asarray(grey < level if gap.light_gap else grey > level)
 
 
 def _agree(one: _Look, other: _Look, tolerance_px: float) -> bool:
@@ -242,7 +274,7 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     first, tip = floor(along_px), max(0, round(tip_px) - BAND_PX)
     count = max(0, min(BELOW, (upright.shape[0] - 1 - first) // BAND_PX))
     if first < 0 or count == 0:
-        return _Look(np.empty((2, 0)), np.empty(0))
+        return _Look(np.empty((2, 0)), np.empty(0), np.nan, (0, 0))
     rows = to_grey(np.ascontiguousarray(upright[first : first + count * BAND_PX + 1])).astype(np.float32)
     # The bands begin at the measuring height itself and not at a whole row: where the outline is curved, at a rounded
     # tip, a band half a row higher shows it at another place.
@@ -260,13 +292,12 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     sides = ((rises, inner_px), (not rises, outer_px))
     sides_px = np.array([_followed(below, level, *side, end.slope) for side in sides]) - across_px
     ends = sorted((inner_px, inner_px - BAND_PX * inwards if np.isnan(outer_px) else outer_px))
+    ends_px = max(0, int(ends[0])), max(0, int(ends[1])) + 1
     bands = min(BEYOND, tip // BAND_PX)
     if not bands:
-        return _Look(sides_px, np.empty(0))
-    columns = slice(max(0, int(ends[0])), max(0, int(ends[1])) + 1)
-    over = to_grey(np.ascontiguousarray(upright[tip - bands * BAND_PX : tip, columns]))
-    is_like = (over < level) if seen.gap.light_gap else (over > level)
-    return _Look(sides_px, is_like.reshape(bands, -1).mean(axis=1)[::-1])
+        return _Look(sides_px, np.empty(0), level, ends_px)
+    over = _is_like(upright[tip - bands * BAND_PX : tip, slice(*ends_px)], seen.gap, level)
+    return _Look(sides_px, over.reshape(bands, -1).mean(axis=1)[::-1], level, ends_px)
 
 
 def _followed(bands: Floats, level: float, rises: bool, start_px: float, slope: float) -> Floats:

@@ -137,6 +137,19 @@ def _hangs_nothing_on(packet: bytes, suffix: str) -> bool:
     return next((kind & 0x60 == 0 for kind in kinds if kind & 0x1F in (1, 5)), False)
 
 
+def test_a_missing_picture_behind_one_with_its_number_is_told(tmp_path: Path) -> None:
+    # The decoder compares a number with that of the picture before, also if no other picture depends on that one.
+    path = tmp_path / "clip.mp4"
+    truth = coded(path, **KINDS["pyramid"], **{"x264-params": "b-adapt=0:scenecut=0"})
+    with av.open(str(path)) as container:
+        packets = [bytes(packet) for packet in container.demux(video=0) if packet.size]
+    is_needed = [not _hangs_nothing_on(packet, ".mp4") for packet in packets]
+    behind = [k for k in range(2, 20) if is_needed[k] and not is_needed[k - 1]]
+    assert len(behind) > 2
+    for k in behind:
+        assert wrong(without(path, {k}), truth) == [], k
+
+
 def test_numbers_that_went_once_around_are_not_believed(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     truth = coded(path, g="60", bf="0", sc_threshold="0")

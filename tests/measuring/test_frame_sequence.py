@@ -126,6 +126,19 @@ def test_fingers_that_the_border_cuts_in_one_frame_are_not_confirmed_by_the_othe
     assert refused(MOTIONS["rest"], change) == [6]
 
 
+def test_fingers_that_leave_their_tips_behind_have_not_moved() -> None:
+    # Below some row, a decoder without checksums goes on with an earlier part of the picture, displaced.
+    def change(k: int, levels: np.ndarray) -> None:
+        if k == 6:
+            ground = levels[:25].copy()
+            levels[90:] = levels[60:-30].copy()
+            levels[90:, :160] = np.roll(levels[90:, :160], -40, axis=1)
+            levels[90:, 160:] = np.roll(levels[90:, 160:], 40, axis=1)
+            levels[68:93] = ground
+
+    assert refused(MOTIONS["slow"], change) == [6]
+
+
 def test_one_finger_alone_does_not_move_along_itself() -> None:
     # A page of raw video that stands elsewhere leaves straight sides where they are, and moves only the tips.
     def change(k: int, levels: np.ndarray) -> None:
