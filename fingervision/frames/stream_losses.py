@@ -23,7 +23,8 @@ LEAP_SHARE = 1.5
 LEAST_BITS = 4
 # Start code between units (ITU-T H.264, B.1), fields of a unit's first byte (7.3.1), and kinds of units that are slices
 # of a picture (7.4.1). The fields of a slice's header up to its picture's number take less than the bytes stated.
-START, REFERENCE, KIND, SLICES, HEADER_BYTES = b"\0\0\1", 0x60, 0x1F, (1, 5), 24
+START, REFERENCE, KIND, IDR, HEADER_BYTES = b"\0\0\1", 0x60, 0x1F, 5, 24
+SLICES = (1, IDR)
 
 
 class StreamLosses:
@@ -153,7 +154,8 @@ class FrameNumbers:
             self._reference, self._announced = number, None
         elif number != self._reference:  # a second field has the number of the first
             self._announced = number
-        return announced is not None and number == (announced + 1) % self._modulus
+        # Numbers begin again with a picture on which alone the next ones depend.
+        return unit & KIND != IDR and announced is not None and number == (announced + 1) % self._modulus
 
     def _may_hide(self, packet: "av.Packet[av.VideoStream]", missing: int, is_due: bool, heard: Heard) -> bool:
         """Whether as many pictures may be missing as make the numbers agree again."""

@@ -2,16 +2,17 @@
 
 A finger is a body: between two frames it moves, rotates and bends a little, at any speed, but it keeps its width and
 its outline, and where it has gone, the ground is seen. Both fingers are held by one frame, so that along their own
-direction neither moves without the other by more than it moves across. Wrong content in a picture (a page of memory that was not written again, a lost packet that
-no checksum covers, an object that passes) has other outlines, or tears the picture between two rows. A jump of the
-measuring points alone proves nothing, because stages make steps and springs vibrate; nor does another outline alone,
-because parts come and go. A measurement is refused if its measuring points jump, the fingers there have not the
-outlines that they have in the last frame, and the next frames do not confirm the change.
+direction neither moves without the other by more than it moves across. Wrong content in a picture (a page of memory
+that was not written again, a lost packet that no checksum covers, an object that passes) has other outlines, or tears
+the picture between two rows. A jump of the measuring points alone proves nothing, because stages make steps and springs
+vibrate; nor does another outline alone, because parts come and go. A measurement is refused if its measuring points
+jump, the fingers there have not the outlines that they have in the last frame, and the next frames do not confirm the
+change.
 
 Method: the outlines of a finger are followed from the measuring point towards its root, on the inner and on the outer
-side, as the places where the grey level passes through that of the measured edge. Relative to the measuring point, and
-apart from a rotation, they must agree between two frames. Symmetric blur from motion or defocus, and a change of the
-light, leave these places where they are.
+side, as the places where the grey level is half-way between finger and ground. Relative to that next to the measuring
+point, and apart from a rotation, they must agree between two frames. Symmetric blur from motion or defocus, and a
+change of the light, leave these places where they are.
 """
 
 from collections.abc import Iterable, Iterator
@@ -44,6 +45,8 @@ BAND_PX, BELOW, BEYOND, COVERED_SHARE = 8, 12, 6, 0.2
 # Permitted difference between the outlines of one finger in two frames: for coarse coding (pixels), and for bending, as
 # a share of the finger's displacement, up to a limit (pixels).
 CODED_PX, BENT_SHARE, MOST_BENT_PX = 0.2, 0.1, 1.0
+# Distance from an edge, in standard deviations of its blur, at which the levels of finger and ground are taken.
+LEVEL_IN_BLURS = 3.0
 # Distance (pixels) within which the outline in a band is searched from the finger's straight side.
 SEARCH_PX = 40
 # Largest share of the bands that may differ, because a part between the fingers may hide most of the inner sides; and
@@ -283,14 +286,18 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     below = np.asarray(cv2.resize(rows, size, interpolation=cv2.INTER_AREA), dtype=np.float64)
     # The edge is measured at the measuring height, and the first band is centred half a band towards the root.
     inner_px = across_px + end.slope * 0.5 * (BAND_PX - 1)
-    level = float(np.interp(inner_px, np.arange(below.shape[1]), below[0]))
     inwards = 1 if is_left else -1
+    # Half-way between finger and ground, and relative to the outline itself: an edge that is moved in one frame alone,
+    # such as by glare beside it that is not told in the next frame, is no other outline.
+    plateaus = inner_px + LEVEL_IN_BLURS * end.blur_px * np.array([-1.0, 1.0])
+    level = float(np.interp(plateaus, np.arange(below.shape[1]), below[0]).mean())
     rises = (inwards > 0) is seen.gap.light_gap
     _, opposite = _crossings(below[:1], level, not rises)
     outside = opposite[inwards * (inner_px - opposite) > 0.0]
     outer_px = float(outside.max() if is_left else outside.min()) if outside.size else float("nan")
     sides = ((rises, inner_px), (not rises, outer_px))
-    sides_px = np.array([_followed(below, level, *side, end.slope) for side in sides]) - across_px
+    sides_px = np.array([_followed(below, level, *side, end.slope) for side in sides])
+    sides_px -= across_px if np.isnan(sides_px[0, 0]) else sides_px[0, 0]
     ends = sorted((inner_px, inner_px - BAND_PX * inwards if np.isnan(outer_px) else outer_px))
     ends_px = max(0, int(ends[0])), max(0, int(ends[1])) + 1
     bands = min(BEYOND, tip // BAND_PX)

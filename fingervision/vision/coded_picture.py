@@ -28,6 +28,7 @@ from fingervision.vision.grey import GreyImage
 from fingervision.vision.median import middle
 from fingervision.vision.orientation import Orientation
 from fingervision.vision.profile_lines import INNER, IS_ROW
+from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.settings import Settings
 from fingervision.vision.shared_profile import even_shift_px, flanks, shared_shift_px
 from fingervision.vision.uneven_noise import uneven_noise
@@ -218,8 +219,7 @@ class CodedPicture:
     Parameters
     ----------
     coding : Coding
-        Coding of the picture, as its source states it; lossless if the quantiser is known, because the codec's
-        contribution then follows from the quantiser instead of the kind of codec.
+        Coding of the picture, as its source states it.
     quantiser : Quantiser or None
         Quantiser steps, if the stream states them.
     noise_left : float
@@ -229,6 +229,11 @@ class CodedPicture:
     coding: Coding
     quantiser: Quantiser | None = None
     noise_left: float = 0.0
+
+    @property
+    def shared_points(self) -> float:
+        """Number of neighbouring points whose noise has a share of the codec; 1 if the quantiser states that share."""
+        return SHARED_POINTS[self.coding if self.quantiser is None else Coding.LOSSLESS]
 
     def with_traces(self, grey: GreyImage) -> "CodedPicture":
         """Return the same, with the noise that an earlier codec has left, if the source states no codec."""
@@ -298,4 +303,4 @@ def coded_picture(frame: Frame, settings: Settings) -> CodedPicture:
     quantiser, region = frame.quantiser, settings.region
     if quantiser is not None and region is not None:
         quantiser = quantiser.seen_from(region.x_px, region.y_px)
-    return CodedPicture(frame.coding if quantiser is None else Coding.LOSSLESS, quantiser)
+    return CodedPicture(frame.coding, quantiser)

@@ -78,7 +78,13 @@ _lines_within = loop("gap_lines_within")
 
 
 def measure_gap(
-    fingers: CoarseFingers, edges: EdgePoints, below_tip_px: float, full_scale: int, light_gap: bool, coding: Coding
+    fingers: CoarseFingers,
+    edges: EdgePoints,
+    below_tip_px: float,
+    full_scale: int,
+    light_gap: bool,
+    coding: Coding,
+    coded_points: float,
 ) -> GapMeasurement | NoGap:
     """Measure the gap from the edge points of both fingers.
 
@@ -95,7 +101,9 @@ def measure_gap(
     light_gap : bool
         Whether the fingers are darker than the gap.
     coding : Coding
-        Coding of the picture, which determines how many neighbouring points share an error.
+        Coding of the picture.
+    coded_points : float
+        Number of neighbouring points that share an error of the codec that nothing else states.
 
     Returns
     -------
@@ -110,10 +118,10 @@ def measure_gap(
     behind = _gripping(fingers, below_tip_px)
     if min(len(p.x) for p in points) < FEWEST_LINES:
         return behind or NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view for a measurement.")
-    shape = _described(points, below_tip_px, max(SHARED_POINTS[coding], edges.shared_lines))
+    shape = _described(points, below_tip_px, max(coded_points, edges.shared_lines))
     points, rough, noise_shared = shape.points, shape.rough, shape.noise_shared
     left, right = shape.ends
-    shared = max(shared_points(points, (left, right), coding), noise_shared)
+    shared = max(shared_points(points, (left, right), coded_points), noise_shared)
     fitted = [
         measuring_point(end, below_tip_px, float(p.blur[0])) for p, end in zip(points, (left, right), strict=True)
     ]
@@ -135,7 +143,7 @@ def measure_gap(
     is_straight = chains is not None and None not in chains
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
-    largest_variance = least_px**2 * SHARED_POINTS[coding]
+    largest_variance = least_px**2 * coded_points
     roughness_px = nan if shape.is_untold and not is_straight else 0.0  # fitting straight sides have no roughness
     roughness_px = roughness_px if rough is None else rough.deviation_px
     outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, largest_variance, roughness_px, held)
@@ -226,6 +234,8 @@ def _measuring_points(
     if len(measured) == len(fitted):
         return chains, measured
     own_chains = chains or NO_CHAINS
+    # A codec's errors extend over its blocks, also where the quantiser states their size.
+    stray = max(shape.noise_shared, SHARED_POINTS[coding])
     if not shape.are_corners or len(measured) != 1:
         own_chains = chain_of_one(own_chains, (left, right), holds, cuts_px)
     are_known = all(does_hold or chain is not None for does_hold, chain in zip(holds, own_chains, strict=True))
@@ -236,7 +246,7 @@ def _measuring_points(
         own = chain if are_known else local_measuring_point(p, below_tip_px, shape.noise_shared)
         # If there is no other description of the outline, residuals that common errors of neighbouring points may
         # cause do not reject the shape.
-        if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, shape.noise_shared)):
+        if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, stray)):
             if found.apex < p.x.min() - 1.0:
                 return chains, NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
             covariance = found.covariance * (spread(end) * shared if shape.rough is None else 1.0)

@@ -34,7 +34,6 @@ from fingervision.vision.interlace import at_half_way
 from fingervision.vision.overlay import draw_boundary, draw_edge_points, draw_overlay, in_eight_bits
 from fingervision.vision.picture_memory import keep_picture_memory
 from fingervision.vision.profile_lines import profile_lines
-from fingervision.vision.residuals import SHARED_POINTS
 from fingervision.vision.response_shift import u_gap_response_px
 from fingervision.vision.roughness import is_surer, with_longer_flanks
 from fingervision.vision.settings import LINEAR_CAMERA, Settings
@@ -257,7 +256,7 @@ def _measured(
         edges, outcome = longer if is_surer(longer[1], outcome) else (edges, outcome)
         if isinstance(outcome, GapMeasurement) and isnan(outcome.roughness_px):
             outcome = replace(outcome, roughness_px=0.0)
-        if isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_PX * sqrt(SHARED_POINTS[coded.coding]):
+        if isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_PX * sqrt(coded.shared_points):
             outcome = replace(TOO_ROUGH, held=outcome.held)
     if isinstance(outcome, GapMeasurement):
         outcome = replace(outcome, u_response_px=u_gap_response_px(outcome, edges, settings.camera.response, scale.top))
@@ -286,7 +285,7 @@ def _edges_and_gap(
     if beside is not None:
         edges = moved_by_recording(upright, edges, light, beside, settings.is_outline)
     edges = with_stripes(upright, edges, light)
-    outcome = measure_gap(fingers, edges, settings.below_tip_px, top, light_gap, coded.coding)
+    outcome = measure_gap(fingers, edges, settings.below_tip_px, top, light_gap, coded.coding, coded.shared_points)
     if isinstance(outcome, GapMeasurement):
         outcome = coded.less_sure(outcome, upright, edges, fingers.orientation, light, top)
     if (apart_px or edges.beside or is_unlike) and isinstance(outcome, GapMeasurement):

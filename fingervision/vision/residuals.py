@@ -63,15 +63,15 @@ def spread(end: FingerEnd) -> float:
 
 
 def shared_points(
-    points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd], coding: Coding
+    points: tuple[OutlinePoints, OutlinePoints], ends: tuple[FingerEnd, FingerEnd], coded: float
 ) -> float:
     """Number of neighbouring points that share an error; one number is used for both fingers.
 
     The error that a codec causes in a whole block is absorbed by the fitted shape and does not appear in the residuals;
-    therefore the block's size is used for coded pictures.
+    therefore the result is at least the number `coded` for the codec's blocks.
     """
     seen: list[float] = [_shared(end.residual, end.robust, p.side) for p, end in zip(points, ends, strict=True)]
-    return max(0.5 * sum(seen), SHARED_POINTS[coding])
+    return max(0.5 * sum(seen), coded)
 
 
 def shape_holds(

@@ -30,7 +30,7 @@ from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
 from tests.benchmarks.frame import Namespace, benchmark, in_turn
-from tests.clips import Codec, coded
+from tests.clips import Codec, coded, h264
 
 RATE_HZ, FRAMES, SIZE_PX = 25.0, 75, (320, 240)
 GREATEST_PX, BELOW_TIP_PX = 60.0, 6.0
@@ -38,7 +38,7 @@ GREATEST_PX, BELOW_TIP_PX = 60.0, 6.0
 GAPS_PX = GREATEST_PX - np.abs(np.arange(FRAMES) % 50 - 25) / 2.0
 FFV1 = Codec("ffv1", "gray", {"level": "3", "slicecrc": "1", "g": "12"})
 MJPEG = Codec("mjpeg", "yuvj420p", {"qmin": "3", "qmax": "3"})
-H264 = Codec("libx264", "yuv420p", {"crf": "18", "g": "25"})
+H264 = Codec("libx264", "yuv420p", {"g": "25", **h264(18).options})
 HEVC = Codec("libx265", "yuv420p", {"crf": "18", "x265-params": "keyint=25:log-level=none"})
 MPEG4 = Codec("mpeg4", "yuv420p", {"qmin": "3", "qmax": "3", "g": "25", "bf": "0"})
 REALTIME = {"g": "25", "b": "2M", "deadline": "realtime", "cpu-used": "-8", "threads": "1"}

@@ -29,7 +29,7 @@ REST_MM, RATIO = 1.0, 7.72
 """Gap at rest, and gap per input; the model is this line."""
 LOG_HZ, LOG_NOISE_MM = 200.0, 5e-5
 CODERS = {
-    "clip.mp4": ("libx264", "yuv420p", {"crf": "16"}),
+    "clip.mp4": ("libx264", "yuv420p", {"crf": "16", "threads": "1", "x264-params": "threads=1:cpu-independent=1"}),
     "clip.mkv": ("ffv1", "gray", {"level": "3", "slicecrc": "1"}),
     "jpeg.mkv": ("mjpeg", "yuvj420p", {"qmin": "2", "qmax": "2"}),
 }

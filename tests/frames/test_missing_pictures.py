@@ -140,7 +140,8 @@ def _hangs_nothing_on(packet: bytes, suffix: str) -> bool:
 def test_a_missing_picture_behind_one_with_its_number_is_told(tmp_path: Path) -> None:
     # The decoder compares a number with that of the picture before, also if no other picture depends on that one.
     path = tmp_path / "clip.mp4"
-    truth = coded(path, **KINDS["pyramid"], **{"x264-params": "b-adapt=0:scenecut=0"})
+    options = {**KINDS["pyramid"], "x264-params": "b-adapt=0:scenecut=0"}
+    truth = coded(path, **options)
     with av.open(str(path)) as container:
         packets = [bytes(packet) for packet in container.demux(video=0) if packet.size]
     is_needed = [not _hangs_nothing_on(packet, ".mp4") for packet in packets]

@@ -1,6 +1,7 @@
 """Rows that the frames before and after them contradict are refused; true motions, however fast, never are."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -137,6 +138,20 @@ def test_fingers_that_leave_their_tips_behind_have_not_moved() -> None:
             levels[68:93] = ground
 
     assert refused(MOTIONS["slow"], change) == [6]
+
+
+def test_an_edge_that_another_model_moves_in_one_frame_is_in_the_same_picture() -> None:
+    results = []
+    for k, gap_px in enumerate(MOTIONS["slow"]):
+        frame = Frame(picture(gap_px, k % 3), k, k / 25)
+        found = measure_frame(frame, SETTINGS)
+        assert isinstance(found, GapMeasurement)
+        if k % 5 == 3:
+            left = replace(found.left, x_px=found.left.x_px - 0.5, tip_px=found.left.tip_px - 0.4)
+            right = replace(found.right, x_px=found.right.x_px + 0.5, tip_px=found.right.tip_px - 0.4)
+            found = replace(found, left=left, right=right)
+        results.append((frame, found))
+    assert all(isinstance(outcome, GapMeasurement) for _, outcome in in_sequence(results))
 
 
 def test_one_finger_alone_does_not_move_along_itself() -> None:
