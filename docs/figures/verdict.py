@@ -4,8 +4,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 QUESTIONS = (
-    ("Does anything gain more than noise\nwould give the best of all effects?", "no", "agrees"),
-    ("Does structure remain that generic\nprobes find, or too much stand?", "yes", "unknown"),
+    ("Is an explanation by effects more\nprobable than none, by 20 to 1?", "no", "agrees"),
+    ("Does structure or too much remain, or\nis an unseen half not predicted?", "yes", "unknown"),
     ("Are there other minimal explanations\nwithin the squared distance of 12?", "yes", "ambiguous"),
 )
 

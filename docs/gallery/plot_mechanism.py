@@ -1,6 +1,6 @@
 """
-Effects of the mechanism: a stiffer hinge, a longer lever, a creeping material
-==============================================================================
+Effects of the mechanism: a longer lever, a wider rest gap, a creeping material
+===============================================================================
 
 Effects of the mechanism change the gap for a given input. The ratio and the rest gap make straight lines over the
 input; creep appears over time, while the stage stands.
