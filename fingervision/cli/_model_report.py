@@ -79,6 +79,8 @@ def say_drawing(mechanism: Mechanism) -> None:
             f"{strip.name} at ({x:.4g}, {y:.4g}) mm, {strip.thickness_mm:.4g} mm thick and "
             f"{2.0 * strip.half_length_mm:.4g} mm long, is treated as a flexure: it is much thinner than what it joins."
         )
+    for leaf, other, (x, y) in mechanism.fused:
+        click.echo(f"The leaves {leaf} and {other} cross at ({x:.4g}, {y:.4g}) mm, where they are one piece.")
     for drive in mechanism.drives:
         click.echo(drive.words)
 

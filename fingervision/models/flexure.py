@@ -1,7 +1,9 @@
 """Geometry of one flexure: the shapes that it adds or removes, its height along its axis, its out-of-plane width."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from math import cos, radians, sin, sqrt
 from typing import Any, Literal
 
@@ -147,6 +149,8 @@ FlexureKind = Literal["circular", "elliptic", "filleted", "leaf", "strip"]
 _HEIGHT_THAT_BENDS = 0.13
 """Largest height that a fillet adds on either side, in thicknesses, for a section that still counts as bending: such a
 section is 1.26 times as high as the neck and twice as stiff in bending."""
+_LEAST_SINE = 0.1
+"""Least sine of the angle between two leaves that cross; others lie on each other."""
 _POISSON = 0.34
 """Poisson's ratio for which the plane-strain share is computed: the share changes by only 0.006 between Poisson's
 ratios nu = 0.2 and 0.34, and is multiplied by nu^2."""
@@ -269,6 +273,17 @@ class Flexure:
         bent, swayed = strip_share(plate_mm / self.bent_mm, _POISSON)
         return 0.5 * (swayed - bent)
 
+    def crosses(self, other: "Flexure") -> float | None:
+        """Position along the axis at which the axis of another leaf crosses this leaf; None if it does not."""
+        own, theirs = (np.array(leaf.point_mm(1.0, 0.0)) - leaf.at_mm for leaf in (self, other))
+        sine = own[0] * theirs[1] - own[1] * theirs[0]
+        if abs(sine) < _LEAST_SINE:
+            return None
+        apart = np.subtract(other.at_mm, self.at_mm)
+        along = float(apart[0] * theirs[1] - apart[1] * theirs[0]) / sine
+        beyond = float(apart[0] * own[1] - apart[1] * own[0]) / sine
+        return along if abs(along) < self.half_length_mm and abs(beyond) < other.half_length_mm else None
+
     def zone(self, plate_mm: float) -> ConstrainedZone:
         """Zone in which the plate's width restrains the flexure, with the degree of restraint that the models use."""
         share = self.width_share(plate_mm)
@@ -277,3 +292,35 @@ class Flexure:
             share += self.used[2] * (stretched - share)
         height = 0.5 * self.thickness_mm + self.depth_mm
         return ConstrainedZone(self.at_mm, self.axis_deg, self.half_length_mm, height, share)
+
+
+def fused(flexures: Sequence[Flexure]) -> tuple[tuple[Flexure, ...], tuple[tuple[str, str, PointMm], ...]]:
+    """Divide leaves of one layer that cross: they are one piece of material there, and each of their parts bends alone.
+
+    Returns
+    -------
+    tuple of Flexure
+        The flexures; of a leaf that crosses others its parts, each of which overlaps the next by a thickness.
+    tuple of (str, str, (float, float))
+        Names of the leaves of every crossing, and its place.
+    """
+    found: list[Flexure] = []
+    crossings: list[tuple[str, str, PointMm]] = []
+    for place, leaf in enumerate(flexures):
+        stops = [-leaf.half_length_mm, leaf.half_length_mm]
+        for number, other in enumerate(flexures):
+            if leaf.kind == other.kind == "leaf" and (at := leaf.crosses(other)) is not None:
+                stops.append(at)
+                if number > place:
+                    crossings.append((leaf.name, other.name, leaf.point_mm(at, 0.0)))
+        if len(stops) == 2:
+            found.append(leaf)
+            continue
+        for part, (a, b) in enumerate(pairwise(sorted(stops)), 1):
+            low, high = (
+                stop if abs(stop) == leaf.half_length_mm else stop + beyond * 0.5 * leaf.thickness_mm
+                for stop, beyond in ((a, -1.0), (b, 1.0))
+            )
+            centre, half = leaf.point_mm(0.5 * (low + high), 0.0), 0.5 * (high - low)
+            found.append(replace(leaf, name=f"{leaf.name} part {part}", at_mm=centre, half_length_mm=half))
+    return tuple(found), tuple(crossings)

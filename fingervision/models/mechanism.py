@@ -174,6 +174,8 @@ class Mechanism:
         Faces that may touch.
     body_names : tuple of str
         Names of `bodies`, in their order; empty for a shape without one.
+    fused : tuple of (str, str, (float, float))
+        Leaves that cross and are one piece there: their names, and the place of the crossing.
     mirrored : bool
         Whether bodies, flexures and faces are the right half of a mechanism whose left half is its mirror image in the
         line x = 0. Forces of drives are those of both halves; a probe with x < 0 lies on the left half.
@@ -191,6 +193,7 @@ class Mechanism:
     pairs: dict[str, tuple[str, str]]
     contacts: tuple[Contact, ...] = ()
     body_names: tuple[str, ...] = ()
+    fused: tuple[tuple[str, str, PointMm], ...] = ()
     mirrored: bool = False
 
     @property
@@ -283,7 +286,8 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
                 "check its place and axis."
             )
         if flexure.kind == "leaf":
-            _check_leaf(flexure, region, uncut, name)
+            others = [other for other in mechanism.flexures if other is not flexure and mechanism.fused]
+            _check_leaf(flexure, region, uncut, others, name)
         elif flexure.is_notch and any(_is_hole(loop.area_mm2, flexure) for loop in region.loops):
             raise DataError(
                 f"The cuts of flexure {flexure.name} of {name} must reach the outer edges of the body, but an "
@@ -342,7 +346,9 @@ def _is_hole(area_mm2: float, flexure: Flexure) -> bool:
     return area_mm2 < 0.0 and abs(area_mm2 + cut_mm2) < _SAME_AREA * cut_mm2
 
 
-def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, name: str) -> None:
+def _check_leaf(
+    flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, others: Sequence[Flexure], name: str
+) -> None:
     """Check that a leaf's free length exceeds its thickness, and that both its ends lie inside bodies."""
     t, reach = flexure.thickness_mm, flexure.half_length_mm
     beside = np.array([flexure.point_mm(x * t, s * 0.501 * t) for x in (-0.5, 0.5) for s in (-1.0, 1.0)]).T
@@ -352,7 +358,8 @@ def _check_leaf(flexure: Flexure, region: PlanarRegion, uncut: PlanarRegion, nam
             "mm, but is not; check its length and whether all lengths are millimetres."
         )
     ends = np.array([flexure.point_mm(s * reach * (1.0 - 1e-6), 0.0) for s in (-1.0, 1.0)]).T
-    inside = uncut.holds(ends)
+    leaves = PlanarRegion(tuple(step for other in others if other.kind == "leaf" for step in other.steps()))
+    inside = uncut.holds(ends) | leaves.holds(ends)
     if not inside.all():
         x, y = ends[:, int(np.argmin(inside))]
         raise DataError(

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from fingervision.domain.errors import DataError
 from fingervision.domain.field import Field, names_of
 from fingervision.domain.parameter import Estimate
-from fingervision.models.flexure import Flexure
+from fingervision.models.flexure import Flexure, fused
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism, check_mechanism
 from fingervision.models.planar_region import PlanarRegion, rounded_corner
 from fingervision.models.plane_shapes import Ellipse, Polygon, RigidMap, Shape, bar, box, crosses_itself
@@ -311,12 +311,14 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
         [named for steps in each("body", _body) for named in steps],
         each("flexure", _flexure), each("fixed", _face), {probe.name: probe.at_mm for probe in file.probe},
     ))  # fmt: skip
+    flexures, crossings = fused(parts.flexures)
     mechanism = Mechanism(
         name=origin if file.name is None else file.name,
         material=material,
         plate_mm=file.plate_mm,
         bodies=tuple(body for _, body in parts.bodies),
-        flexures=tuple(parts.flexures),
+        flexures=flexures,
+        fused=crossings,
         fixed=tuple(parts.fixed),
         slides=tuple(zip(each("slide", _face), [slide.holds for slide in file.slide], strict=True)),
         drives=tuple(each("drive", _drive)),
