@@ -137,3 +137,8 @@ class Actuator(MoveCheck, Protocol):
     def close(self) -> None:
         """Stop and release the hardware; closing twice is allowed."""
         ...
+
+
+def in_a_line(error: Exception) -> str:
+    """An exception's class and message, in one line without a full stop."""
+    return f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from fingervision.domain.errors import DeviceError, LimitError
 from fingervision.domain.model import Model
 from fingervision.measuring.scale import Scale
 from fingervision.testbed.actuator import Actuator
@@ -59,6 +60,22 @@ class Bed:
     replays: bool = False
     about: Mapping[str, Any] = field(default_factory=dict)
     channels: Mapping[str, TextSensor] = field(default_factory=dict)
+
+    def check(self, force_n: float | None, limit_n: float, where: str = "") -> None:
+        """Refuse to go on with an alarm of the actuator, or with a force (None: not measured) beyond a limit.
+
+        Raises
+        ------
+        DeviceError, LimitError
+            With the alarm, or with the force; `where` is added to it.
+        """
+        alarm = self.actuator.alarm
+        if alarm is not None:
+            raise DeviceError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")
+        if force_n is not None and abs(force_n) > limit_n:
+            raise LimitError(
+                f"The force must stay below {limit_n:g} N, but is {force_n:.3g} N{where}: the motor was stopped."
+            )
 
     def close(self) -> None:
         """Stop the motor first, then release all hardware."""

@@ -20,7 +20,7 @@ from typing import Self, TypeVar
 
 from fingervision.domain.errors import DeviceError, FingervisionError, StateError
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.actuator import Alarm, RefusedError, StageLimits
+from fingervision.testbed.actuator import Alarm, RefusedError, StageLimits, in_a_line
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.motion.move_limits import LIMIT_KEYS, FreeMoves, check_move, check_speed, stage_limits
@@ -362,11 +362,6 @@ class SingleAxis(FreeMoves, ABC):
             raise DeviceError(
                 f"{self.name} must answer a request, but did not ({in_a_line(error)}): check its cable."
             ) from error
-
-
-def in_a_line(error: Exception) -> str:
-    """An exception's class and message, in one line without a full stop."""
-    return f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
 
 
 def without_hardware(section: Section, folder: Path) -> FreeMoves:

@@ -9,12 +9,11 @@ import threading
 from typing import Any
 
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.actuator import RefusedError
+from fingervision.testbed.actuator import RefusedError, in_a_line
 from fingervision.testbed.actuators._single_axis import KEYS as AXIS
 from fingervision.testbed.actuators._single_axis import (
     AxisSettings,
     SingleAxis,
-    in_a_line,
     stated_axis,
     without_hardware,
 )

@@ -127,11 +127,11 @@ def _watched(
         with motor_stops_first(bed.actuator.stop):
             begin()
             while bed.actuator.busy:
-                _check(bed, looking.force_n())
+                bed.check(looking.force_n(), bed.limits.force_n)
                 if bed.clock.now_s() - began_s >= for_s or enough(looking.position_mm()):
                     bed.actuator.stop()
                 looking.wait()
-            _check(bed, looking.force_n())
+            bed.check(looking.force_n(), bed.limits.force_n)
     except Interrupted:
         at_mm = looking.position_mm()
         raise StateError(f"Stopped: the motor has stopped near {at_mm:.3f} mm.") from None
@@ -139,16 +139,6 @@ def _watched(
         bed.actuator.stop()
         raise
     return looking.position_mm()
-
-
-def _check(bed: Bed, force_n: float | None) -> None:
-    alarm = bed.actuator.alarm
-    if alarm is not None:
-        raise DeviceError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")
-    if force_n is not None and abs(force_n) > bed.limits.force_n:
-        raise LimitError(
-            f"The force must stay below {bed.limits.force_n:g} N, but is {force_n:.3g} N: the motor was stopped."
-        )
 
 
 # Stop a test bed, also if another process operates it.

@@ -138,15 +138,8 @@ class Watch:
         look = self.sight.look()
         # Between the last reading in motion and the first one after a stop, nobody knows where the stage was.
         self._end_if_stopped()
-        alarm = self.bed.actuator.alarm
-        if alarm is not None:
-            raise DeviceError(f"The actuator has an alarm ({alarm.code}: {alarm.words}): the motor was stopped.")
-        limit_n = min(self.below_force_n, self.bed.limits.force_n)
-        if look.force_now_n is not None and abs(look.force_now_n) > limit_n and not self._closes:
-            raise LimitError(
-                f"The force must stay below {limit_n:g} N, but is {look.force_now_n:.3g} N at "
-                f"{self.sight.position.newest:.3f} mm: the motor was stopped."
-            )
+        limit_n = inf if self._closes else min(self.below_force_n, self.bed.limits.force_n)
+        self.bed.check(look.force_now_n, limit_n, f" at {self.sight.position.newest:.3f} mm")
         return look
 
     def see(self, *, record: bool) -> tuple[Look, GapRow]:

@@ -10,7 +10,7 @@ import serial
 
 from fingervision.domain.errors import DeviceError
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.actuator import RefusedError
+from fingervision.testbed.actuator import RefusedError, in_a_line
 from fingervision.testbed.text_protocol.words import Exchange, Words, filled
 
 KEYS = ("words", "port", "baud", "set")
@@ -266,8 +266,7 @@ def opened_line(section: Section, words: Words) -> Line:
     except ImportError as error:
         section.refuse("port", f"is a VISA resource, which needs pyvisa ({error}): pip install 'fingervision[visa]'.")
     except Exception as error:  # pyserial and each VISA library raise exceptions of their own classes
-        said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-        section.refuse("port", f"must be that of {words.name}, but {name} could not be opened ({said}).")
+        section.refuse("port", f"must be that of {words.name}, but {name} could not be opened ({in_a_line(error)}).")
     try:
         return Line(port, words)
     except RefusedError as error:
