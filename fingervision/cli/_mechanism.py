@@ -25,10 +25,13 @@ from fingervision.models.mechanism import Mechanism
 from fingervision.models.uncertainty import mechanism_uncertainty
 from fingervision.storage.mechanism_toml import read_drawing
 from fingervision.storage.out_folder import make_out_folder
+from fingervision.storage.row_file import write_table
 
 # Tables and plots of a mechanism whose drawing lists its bodies (mechanism.toml).
 
 _STYLES = ("-", "--", "-.")
+_REFINED = (0.5, 0.7, 1.0, 1.4)
+"""Factors by which the meshes of a convergence table are finer than that of the model."""
 _IN_PLOT = 4
 """Most curves of a plot whose legend fits into it."""
 _STILL = 0.01
@@ -179,6 +182,24 @@ def predict(
     warn(mechanism, models[chief], states[chief], table[chief], contact=contact)
     for sentence in found.warnings:
         click.echo(f"Warning: {sentence}", err=True)
+
+
+def write_convergence(mechanism: Mechanism, out: Path, *, as_json: bool) -> None:
+    """Compute finite elements on meshes of four sizes, write convergence.csv, and print the table."""
+    rows: list[list[float]] = []
+    for refine in _REFINED:
+        model = MechanismPlate(mechanism, refine=refine)
+        moved = model.state(1.0)
+        motions = [part for probe in moved.probes_mm.values() for part in probe]
+        mode_hz = model.modes_hz(drive_held=False, count=1)[0]
+        triangles = model.mesh.triangles.shape[1]
+        rows.append([refine, triangles, model.stiffness_n_mm, moved.stress_mpa, mode_hz, *motions])
+    names = ["refined", "triangles", "input_stiffness_n_mm", "peak_stress_mpa_per_mm", "mode_1_drive_free_hz"]
+    names += [f"{name}_{axis}_per_input_mm_mm" for name in mechanism.probes for axis in "xy"]
+    make_out_folder(out)
+    write_table(out / "convergence.csv", names, rows, digits=7)
+    table = {f"mesh x {row[0]:g}": dict(zip(names[1:], row[1:], strict=True)) for row in rows}
+    click.echo(json.dumps(table, indent=2) if as_json else figures_text(mechanism.name, table, digits=6, least=36))
 
 
 def _refuse_what_is_not_computed(mechanism: Mechanism, kind: str, asked: MotionAsked) -> None:

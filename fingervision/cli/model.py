@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from fingervision.domain.gripper import Gripper
     from fingervision.interface.prediction import GripperPrediction
 
-_SWEPT = ("vary.csv", "vary.png", "solve.csv", "vary.svg", "vary.pdf")
+_SWEPT = ("convergence.csv", "vary.csv", "vary.png", "solve.csv", "vary.svg", "vary.pdf")
 _PREDICTED = (
     *(f"{name}.{ending}" for ending in ("svg", "pdf") for name in (
         "models", "deformed", "mesh", "modes", "frequency", "grip", "response", "uncertainty",
@@ -150,6 +150,12 @@ Examples:
     help="Write the outline as .dxf or .svg, or the plate as .stl (mm), and compute nothing (repeatable).",
 )
 @option(
+    "--convergence",
+    is_flag=True,
+    group=ASKED,
+    help="Compute finite elements on meshes of four sizes only, and write convergence.csv.",
+)
+@option(
     "--magnify",
     type=NUMBER,
     default=1.0,
@@ -185,6 +191,7 @@ def command(
     object_mm: float | None,
     object_n_mm: float | None,
     export: tuple[Path, ...],
+    convergence: bool,
     magnify: float,
     colour: str,
     vector: bool,
@@ -234,6 +241,16 @@ def command(
         return
     out = results_folder(out, gripper_toml)
     began_ns = began_in(out)
+    if convergence:
+        from fingervision.cli._mechanism import write_convergence
+        from fingervision.models.gripper_mechanism import half_mechanism
+        from fingervision.storage.mechanism_toml import read_mechanism
+
+        drawn = is_mechanism(gripper_toml)
+        mechanism = read_mechanism(gripper_toml) if drawn else half_mechanism(read_gripper(gripper_toml))
+        write_convergence(mechanism, out, as_json=as_json)
+        finish_in(out, gripper_toml, _SWEPT, began_ns)
+        return
     if is_mechanism(gripper_toml):
         from fingervision.cli._mechanism import predict
 

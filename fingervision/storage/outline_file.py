@@ -84,7 +84,7 @@ def _dxf_chains(path: Path, layer: str, unit_mm: float | None) -> Iterator[Chain
     try:
         document = ezdxf.readfile(path)
     except (OSError, ezdxf.DXFError, UnicodeDecodeError) as error:
-        raise DataError(f"{path} must be a DXF drawing, but could not be read: {error}.") from error
+        raise DataError(f"{path} must be a DXF drawing, but could not be read: {str(error).rstrip('.')}.") from error
     if unit_mm is None:
         unit_mm = ezdxf.units.conversion_factor(document.units, 4) if document.units else 1.0
     layers = {each.dxf.name.lower(): each.is_on() and not each.is_frozen() for each in document.layers}

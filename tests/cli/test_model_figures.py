@@ -102,3 +102,15 @@ def test_what_cannot_be_answered_is_refused_before_the_computing(
     done = model(tmp_path, text, *options)
     assert done.exit_code != 0
     assert not (tmp_path / "out" / "models.csv").exists()
+
+
+@pytest.mark.slow
+def test_a_convergence_table_shows_the_limit_of_fine_meshes(tmp_path: Path) -> None:
+    done = model(tmp_path, DRAWING + PROBES, "--convergence")
+    assert done.exit_code == 0, done.output
+    table = np.genfromtxt(tmp_path / "out" / "convergence.csv", delimiter=",", names=True)
+    assert np.all(np.diff(table["triangles"]) > 0)
+    stiffness = table["input_stiffness_n_mm"]
+    # Displacement elements are too stiff, the less the finer they are.
+    assert np.all(np.diff(stiffness) < 1e-4 * stiffness[0])
+    assert stiffness[-1] == pytest.approx(stiffness[-2], rel=2e-3)
