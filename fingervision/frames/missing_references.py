@@ -177,7 +177,9 @@ def _by_time(packets: list[CodedTime]) -> dict[int, str]:
         return {}
     needed = sorted((each.tick, k) for k, each in enumerate(packets) if each.is_needed and each.tick is not None)
     key_numbers = [k for k, each in enumerate(packets) if each.is_key]
-    found = {}
+    found: dict[int, str] = {}
+    untold: dict[int, str] = {}
+    has_paused = False
     for at, step in holes:
         count = round(step / usual) - 1
         if count < 1 or not _is_whole(step, usual):
@@ -185,14 +187,20 @@ def _by_time(packets: list[CodedTime]) -> dict[int, str]:
         # The missing pictures were coded after the last reference picture before the hole.
         last = bisect_right(needed, (at, len(packets)))
         number = needed[last - 1][1] + 1 if last else 0
-        if number >= len(packets) or packets[number].is_key or _all_came(key_numbers, number, count):
+        if number >= len(packets) or packets[number].is_key:
             continue
-        found[number] = TIME_LEFT_OUT.format(count=count)
-    return found
+        all_came = _all_came(key_numbers, number, count)
+        has_paused = has_paused or all_came is True
+        if not all_came:
+            (found if all_came is False else untold)[number] = TIME_LEFT_OUT.format(count=count)
+    # In a group without end, nothing counts the pictures: there the camera does what it did in the others.
+    return found if has_paused and not found else found | untold
 
 
-def _all_came(key_numbers: list[int], number: int, count: int) -> bool:
+def _all_came(key_numbers: list[int], number: int, count: int) -> bool | None:
     """Whether as many packets as usual lie between the key frames around a hole, which means that the camera paused.
+
+    None if the key frames do not tell, because they are few or irregular, or none follows.
 
     A coder that makes every n-th picture a key frame counts the pictures that it coded. Lost pictures would reduce the
     number of packets between two key frames, unless a multiple of n was lost.
@@ -200,10 +208,11 @@ def _all_came(key_numbers: list[int], number: int, count: int) -> bool:
     lengths = [after - before for before, after in pairwise(key_numbers)]
     behind = bisect_right(key_numbers, number)
     if len(lengths) < FEWEST_LENGTHS or not 0 < behind < len(key_numbers):
-        return False
+        return None
     usual, often = Counter(lengths).most_common(1)[0]
-    is_fixed = usual > 1 and often >= KEYS_SHARE * len(lengths)
-    return is_fixed and lengths[behind - 1] == usual and count % usual != 0
+    if usual < 2 or often < KEYS_SHARE * len(lengths):
+        return None
+    return lengths[behind - 1] == usual and count % usual != 0
 
 
 def _sticks_out(steps: list[int], k: int) -> bool:
