@@ -81,6 +81,9 @@ class EdgeFit:
         Positions of the edges, and their covariance with everything else free.
     by_pixels : bool
         See `EdgeData`.
+    codec : float
+        Standard deviation of what a codec leaves of a plateau's levels, with which the fit was made (share of the
+        contrast).
     """
 
     family: Family
@@ -97,6 +100,7 @@ class EdgeFit:
     at_px: Floats = field(default_factory=lambda: np.zeros(0))
     at_covariance: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     by_pixels: bool = False
+    codec: float = 0.0
 
     def response(self) -> CameraResponse:
         """Tone curve of the fit."""
@@ -146,6 +150,8 @@ class EdgeData:
         Logarithm of the determinant of `whiten`, which is part of the evidence where uncertainties differ.
     are_alike : bool
         Whether both edges of a finger have nearly the same blur, because they lie in one depth.
+    codec : float
+        Standard deviation of what a codec leaves of a plateau's levels (share of the contrast).
     by_pixels : bool
         Whether pixels were smoothed, rather than the light on them.
     """
@@ -162,6 +168,7 @@ class EdgeData:
     u_lost: Floats
     log_scale: float
     are_alike: bool
+    codec: float = 0.0
     by_pixels: bool = False
 
     @classmethod
@@ -237,6 +244,7 @@ class EdgeData:
             _u_lost(sigma, contrast, np.array(steps)),
             log_scale,
             discrepancy > 0.0 or bool(structure.any()),
+            codec,
         )
 
     def start(self) -> Floats:
@@ -396,6 +404,7 @@ def fitted(
         unknowns[at],
         covariance[np.ix_(at, at)],
         data.by_pixels,
+        data.codec,
     )
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from calib.camera_response import CameraResponse
 from calib.edge_fit import EdgeData, EdgeFit, fitted, with_smoothing
 from calib.edge_profile import EdgeProfile
-from calib.tone_curves import FAMILIES, LEVELS, curve_response, family
+from calib.tone_curves import FAMILIES, LEVELS, Family, curve_response, family
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 LINEAR_PRIOR = 0.5
 # Least probability of a family that counts, and probability from which nothing else is averaged with a standard curve.
 LEAST_PROBABILITY, CERTAIN = 1e-3, 0.99
+# Probability of what may lie beyond two standard uncertainties, and weight with which they reach a single alternative.
+UNCOVERED, REACHED = 0.05, 0.25
 
 
 def fit_families(
@@ -35,6 +37,7 @@ def fit_families(
     scale: float = 1.0,
     tagged: str = "",
     steps: Sequence[float] = (),
+    codec: Sequence[float] = (0.0,),
 ) -> list[EdgeFit]:
     """Fit every family to profiles, the most probable one first.
 
@@ -50,12 +53,21 @@ def fit_families(
         Standard response that a tag of the file states, which becomes a further family; empty without one.
     steps : sequence of float
         Steps of a codec's quantiser for the eight frequencies across an edge (shares of full scale); empty without one.
+    codec : sequence of float
+        Standard deviations of what a codec leaves of a plateau's levels (shares of the contrast), all as probable.
     """
-    data = EdgeData.of(profiles, model_error, scale, steps)
-    data = with_smoothing(data, [each for each in FAMILIES if not each.mean])
     families = list(FAMILIES)
     if tagged and all(each.name != tagged for each in FAMILIES):
         families.append(family(tagged))
+    fits = [
+        fit for each in codec for fit in _fits(EdgeData.of(profiles, model_error, scale, steps, codec=each), families)
+    ]
+    return sorted(fits, key=lambda fit: -fit.log_evidence)
+
+
+def _fits(data: EdgeData, families: Sequence[Family]) -> list[EdgeFit]:
+    """Fit of every family to the same data."""
+    data = with_smoothing(data, [each for each in families if not each.mean])
     fits: list[EdgeFit] = []
     for each in families:
         # Edges and optics are nearly the same for all curves, but there are several optima: a curve with parameters
@@ -65,7 +77,7 @@ def fit_families(
         starts = {id(fit): fit.edges for fit in begun}.values() or [data.start()]
         found = [fitted(each, data, start) for start in starts]
         fits.append(max(found, key=lambda fit: fit.log_evidence))
-    return sorted(fits, key=lambda fit: -fit.log_evidence)
+    return fits
 
 
 def probabilities(fits: Sequence[EdgeFit]) -> Floats:
@@ -116,5 +128,25 @@ class ResponsePosterior:
                     [p * np.interp(LEVELS, r.level, r.light) for fit, p in likely for r in (fit.response(),)], axis=0
                 ),
             )
-        others = [(fit.response(), p) for fit, p in likely if fit.response() is not curve]
+        others = _covering(curve, [(fit.response(), p) for fit, p in likely if fit.response() is not curve])
         return cls(curve, (*others, *((other, p) for fit, p in likely for other in fit.one_sigma())))
+
+
+def _covering(used: CameraResponse, others: list[tuple[CameraResponse, float]]) -> list[tuple[CameraResponse, float]]:
+    """Weights of other curves, of which one is so far away that the others beyond it are hardly ever true.
+
+    The variance of a few alternatives does not reach an improbable one (JCGM 101:2008, 5.3.4: coverage interval).
+    """
+
+    def half(curve: CameraResponse) -> float:
+        return float(np.interp(0.5, curve.level, curve.light))
+
+    def away(each: tuple[CameraResponse, float]) -> float:
+        return -abs(half(each[0]) - half(used))
+
+    others, beyond = sorted(others, key=away), 0.0
+    for place, (other, p) in enumerate(others):
+        beyond += p
+        if beyond > UNCOVERED:
+            return [*others[:place], (other, max(p, REACHED)), *others[place + 1 :]]
+    return others

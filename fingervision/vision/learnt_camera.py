@@ -8,7 +8,7 @@ import numpy as np
 from calib.camera_response import CURVES, standard_response
 from calib.edge_fit import EdgeFit
 from calib.edge_profile import EdgeProfile
-from calib.edge_response import LINEAR_PRIOR, ResponsePosterior, fit_families, probabilities
+from calib.edge_response import ResponsePosterior, fit_families, probabilities
 from calib.tone_curves import family
 from fingervision.domain.camera import (
     BesideEdges,
@@ -40,7 +40,9 @@ MOST_MISFIT = 1.3
 NEGATIVE_TAILS = 0.08
 # Share of a curve's displacement of an edge that is added to the uncertainty for curves of no family: their error in
 # recordings of log, film and S-curves (tests/benchmarks/unknown_cameras.py).
-FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15}
+FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15, Coding.INTERFRAME: 0.15}
+# What codecs leave on an edge (see `EdgeData`), from the finest to the coarsest.
+CODECS = (0.0005, 0.001, 0.002, 0.004, 0.008)
 # Probability of nothing beside the edges below which a tone curve does not explain them alone (20:1), and of a rival
 # that still counts.
 UNLIKELY, LEAST_RIVAL = 0.05, 1e-3
@@ -53,12 +55,6 @@ SHARPENED = (
     "The camera sharpens its pictures (its point spread has negative tails, {share:.0%} of the light), which hides its "
     "tone curve: nothing is corrected, and u_shift_px contains a usual tone curve. Switch sharpening off, or "
     f"{REMEDY}."
-)
-# A third of the sRGB recordings through H.264 were called linear (tests/benchmarks/unknown_cameras.py), and two of five
-# linear ones curved (CRF 28), also with the detail that the quantiser removes as an unknown.
-HIDDEN = (
-    "The camera's response was not learnt, because a codec that predicts pictures from others (H.264) smooths edges in "
-    f"a way that hides a tone curve: u_shift_px contains another usual response. Record losslessly, or {REMEDY}."
 )
 MISFIT = (
     "The shape of the edges is that of no usual tone curve (the residuals are {misfit:.1f} times their uncertainty), "
@@ -122,7 +118,9 @@ def learnt_from_profiles(
     camera = replace(
         prior,
         point_spread=_point_spread(best),
-        discrepancy=CameraQuantity(max(misfit, 1.0) * MODEL_ERROR[coding], None, Origin.LEARNT),
+        discrepancy=CameraQuantity(
+            max(misfit, 1.0) * float(np.hypot(MODEL_ERROR[coding], best.codec)), None, Origin.LEARNT
+        ),
     )
     if not is_known:
         camera = _with_response(camera, fits, scenes, coding)
@@ -133,10 +131,8 @@ def learnt_from_profiles(
         if any(fit.scene.name for fit in same):
             told = sum(float(p) for p, fit in zip(probabilities(every), every, strict=True) if fit.scene.name)
             camera = replace(camera, beside=_if_told(beside_edges(same, sight.profiles), told))
-    if coding is not Coding.INTERFRAME:
-        u_px = u_of_rivals_px(every, probabilities(every), sight.profiles, camera.response.curve.name)
-        camera = replace(camera, beside=less_sure(camera.beside, u_px))
-    return camera
+    u_px = u_of_rivals_px(every, probabilities(every), sight.profiles, camera.response.curve.name)
+    return replace(camera, beside=less_sure(camera.beside, u_px))
 
 
 def _if_told(beside: BesideEdges | None, told: float) -> BesideEdges | None:
@@ -155,9 +151,6 @@ def _with_response(
 ) -> CameraModel:
     """Camera with the response of the fits; less probable ones with something beside the edges widen what is open."""
     assumed = camera.response.curve
-    if coding is Coding.INTERFRAME:
-        # The response stays linear, but another one is as probable (two values, JCGM 100:2008, 4.3.9).
-        return _not_learnt(camera, HIDDEN, 1.0 - LINEAR_PRIOR)
     response = _response(fits, coding)
     rivals = zip(scenes, probabilities(scenes), strict=True) if scenes else ()
     others = [OtherResponse(fit.response(), float(p)) for fit, p in rivals if p > LEAST_RIVAL and fit.scene.name]
@@ -173,12 +166,13 @@ def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[l
     What a codec has lost is inferred only where the optics nearly explain the edges: a coarser quantiser than that of
     `STEPS` shows as a misfit.
     """
-    fits = fit_families(profiles, MODEL_ERROR[coding], tagged=tagged)
+    codec = CODECS if coding is Coding.INTERFRAME else (0.0,)
+    fits = fit_families(profiles, MODEL_ERROR[coding], tagged=tagged, codec=codec)
     misfit = _misfit(fits)
     outer = [profile for profile in profiles if profile.is_outer]
     if misfit > MOST_MISFIT and 0 < len(outer) < len(profiles):
         profiles = outer
-        fits = fit_families(profiles, MODEL_ERROR[coding], tagged=tagged)
+        fits = fit_families(profiles, MODEL_ERROR[coding], tagged=tagged, codec=codec)
         misfit = _misfit(fits)
     if misfit <= MOST_MISFIT and coding in STEPS:
         fits = fit_families(profiles, MODEL_ERROR[coding], tagged=tagged, steps=STEPS[coding])
@@ -192,7 +186,7 @@ def _with_scenes(fits: Sequence[EdgeFit], sight: FlankSight) -> tuple[list[EdgeF
     if not sight.can_tell or not (fits[0].parameters.size or sight.is_more_beside(fits[0].family)):
         return [], 1.0
     always = [family("linear"), family("srgb")]
-    found = sight.fits(always, [fit.family for fit in fits if fit.family not in always])
+    found = sight.fits(always, list(dict.fromkeys(fit.family for fit in fits if fit.family not in always)))
     bare = sum(float(p) for p, fit in zip(probabilities(found), found, strict=True) if not fit.scene.name)
     return ([], 1.0) if bare > SURE or _misfit(found) > MOST_MISFIT else (found, bare)
 
@@ -207,6 +201,10 @@ def _response(fits: Sequence[EdgeFit], coding: Coding) -> ResponseEstimate:
     others = [OtherResponse(other, weight) for other, weight in found.others]
     if found.curve is not standard_response("linear"):
         others.append(OtherResponse(standard_response("linear"), FOREIGN_CURVE[coding] ** 2))
+    if coding is Coding.INTERFRAME:
+        # Such a codec takes from an edge the detail in which a tone curve shows: the true one may be anything between
+        # the learnt one and the usual one (a rectangular distribution, JCGM 100:2008, 4.3.7).
+        others.append(OtherResponse(standard_response("srgb"), 1.0 / 3.0))
     return ResponseEstimate(found.curve, tuple(others), Origin.LEARNT)
 
 

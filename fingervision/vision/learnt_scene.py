@@ -10,7 +10,7 @@ from calib.blurred_step import BlurredStep
 from calib.camera_response import CameraResponse
 from calib.edge_fit import EdgeFit
 from calib.edge_profile import EdgeProfile
-from calib.edge_response import probabilities
+from calib.edge_response import UNCOVERED, probabilities
 from calib.edge_scene import SCENES, Scene
 from calib.scene_fit import fit_scenes, is_more_beside
 from calib.tone_curves import Family, family, fixed_family
@@ -21,8 +21,9 @@ from fingervision.vision.flank_profiles import Seen, unclipped_profiles
 
 Floats = NDArray[np.float64]
 
-# Standard deviation of a profile about the best model, as a share of its contrast: optics, JPEG of quality 85, H.264.
-MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.01}
+# Standard deviation of a profile about the best model, independent from bin to bin, as a share of its contrast: optics,
+# JPEG of quality 85; what H.264 leaves is another matter (`CODEC_PX`).
+MODEL_ERROR = {Coding.LOSSLESS: 0.001, Coding.INTRAFRAME: 0.004, Coding.INTERFRAME: 0.001}
 # Standard deviation of a real edge about the best model, smooth over a pixel, as a share of its contrast: optics
 # (0.003) with what real walls, lines and shadows differ from the models. What a codec leaves beside it (`CODEC_PX`).
 DISCREPANCY, CODEC = 0.004, 0.002
@@ -40,8 +41,6 @@ SURE = 0.99
 ADDED_PX, ADDED_EVERY_PX, LEAST_WEIGHT = 30.0, 0.1, 1e-3
 # Standard uncertainty of the logarithm of a tip's blur, in general and where light beside the edges widens it.
 U_TIP, U_TIP_LIGHT = 0.15, 0.25
-# Probability of what may lie beyond two standard uncertainties.
-UNCOVERED = 0.05
 
 
 def learnt_beside(
@@ -147,9 +146,14 @@ class FlankSight:
         A wall is not seen at the tip, and motion does not widen it; shadows and bright lines are seen there as well, if
         not equally.
         """
-        steps = STEPS.get(self.coding, ())
         fits = fit_scenes(
-            self.profiles, self.discrepancy, families, others, steps, codec=self.codec, scenes=self.scenes
+            self.profiles,
+            self.discrepancy,
+            families,
+            others,
+            STEPS.get(self.coding, ()),
+            codec=self.codec,
+            scenes=self.scenes,
         )
         if self.blurs_px is None:
             return fits

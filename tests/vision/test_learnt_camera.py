@@ -1,7 +1,9 @@
 """The camera that edges show after a codec: what JPEG and H.264 hide is in the uncertainty."""
 
 from dataclasses import replace
+from io import BytesIO
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -26,28 +28,61 @@ Floats = NDArray[np.float64]
 INSIDE, OUTSIDE, SIGMA_PX = 0.07, 0.65, 0.8
 
 
-def jpeg_profiles(name: str, seed: int, quality: int) -> list[EdgeProfile]:
-    """Four slightly tilted edges in six pictures each, through the camera's curve, noise and JPEG."""
-    rng, response = np.random.default_rng(seed), standard_response(name)
+def drawn_edge(
+    name: str, side: float, pictures: int, sigma_px: float, rng: np.random.Generator
+) -> tuple[list[Floats], list[NDArray[np.uint8]]]:
+    """Distances from a slightly tilted edge that moves a little, and the stored levels, of each picture."""
+    response = standard_response(name)
     y, x = np.mgrid[0:72, 0:64]
-    found = []
+    tilt, at = rng.uniform(-0.04, 0.04), rng.uniform(28.0, 36.0)
+    away, stored = [], []
+    for _ in range(pictures):
+        at += rng.uniform(-0.3, 0.3)
+        distance = side * (x - at - tilt * (y - 36))
+        light = INSIDE + (OUTSIDE - INSIDE) * ndtr(distance / np.hypot(sigma_px, 12.0**-0.5))
+        light += np.sqrt(light / 8000.0) * rng.standard_normal(light.shape)
+        away.append(distance)
+        stored.append(np.rint(255.0 * np.interp(light, response.light, response.level)).astype(np.uint8))
+    return away, stored
+
+
+def profile_of(away: list[Floats], pictures: list[NDArray[np.uint8]], side: float) -> EdgeProfile:
+    near = [np.abs(distance) < 9.0 for distance in away]
+    frame = np.repeat(np.arange(len(away)), [np.count_nonzero(is_near) for is_near in near])
+    distance = np.concatenate([one[is_near] for one, is_near in zip(away, near, strict=True)])
+    level = np.concatenate([one[is_near] / 255.0 for one, is_near in zip(pictures, near, strict=True)])
+    bins = binned_profile(distance, level, frame, 1.0 / 255.0, side)
+    assert bins is not None
+    return bins
+
+
+def jpeg_profiles(name: str, seed: int, quality: int) -> list[EdgeProfile]:
+    """Four edges in six pictures each, through the camera's curve, noise and JPEG."""
+    rng, found = np.random.default_rng(seed), []
     for side in (1.0, -1.0, 1.0, -1.0):
-        away, level = [], []
-        tilt, at = rng.uniform(-0.04, 0.04), rng.uniform(28.0, 36.0)
-        for _ in range(6):
-            at += rng.uniform(-0.3, 0.3)
-            distance = side * (x - at - tilt * (y - 36))
-            light = INSIDE + (OUTSIDE - INSIDE) * ndtr(distance / np.hypot(SIGMA_PX, 12.0**-0.5))
-            light += np.sqrt(light / 8000.0) * rng.standard_normal(light.shape)
-            stored = np.rint(255.0 * np.interp(light, response.light, response.level)).astype(np.uint8)
-            coded = cv2.imencode(".jpg", stored, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
-            near = np.abs(distance) < 9.0
-            away.append(distance[near])
-            level.append(cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE)[near] / 255.0)
-        group = np.repeat(np.arange(len(away)), [one.size for one in away])
-        bins = binned_profile(np.concatenate(away), np.concatenate(level), group, 1.0 / 255.0, side)
-        assert bins is not None
-        found.append(bins)
+        away, stored = drawn_edge(name, side, 6, SIGMA_PX, rng)
+        coded = [cv2.imencode(".jpg", one, [cv2.IMWRITE_JPEG_QUALITY, quality])[1] for one in stored]
+        found.append(profile_of(away, [cv2.imdecode(one, cv2.IMREAD_GRAYSCALE) for one in coded], side))
+    return found
+
+
+def h264_profiles(name: str, seed: int) -> list[EdgeProfile]:
+    """Four edges in twelve pictures each, through the camera's curve, noise and H.264."""
+    rng, found = np.random.default_rng(seed), []
+    for side in (1.0, -1.0, 1.0, -1.0):
+        away, stored = drawn_edge(name, side, 12, 1.2, rng)
+        with BytesIO() as memory:
+            with av.open(memory, "w", format="matroska") as container:
+                stream = container.add_stream("libx264", rate=25, options={"crf": "20"})
+                stream.width, stream.height, stream.pix_fmt = 64, 72, "yuvj420p"
+                for one in stored:
+                    picture = av.VideoFrame.from_ndarray(one, format="gray")
+                    container.mux(stream.encode(picture.reformat(format="yuvj420p", src_color_range=2)))
+                container.mux(stream.encode())
+            memory.seek(0)
+            with av.open(memory) as container:
+                seen = [frame.to_ndarray()[:72] for frame in container.decode(video=0)]
+        found.append(profile_of(away, seen, side))
     return found
 
 
@@ -70,12 +105,20 @@ def test_what_jpeg_hides_is_in_the_uncertainty(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["srgb", "linear"])
-def test_after_h264_a_linear_and_a_usual_curve_are_equally_probable(name: str) -> None:
-    camera = learnt_from_profiles(jpeg_profiles(name, 1, 85), ASSUMED_CAMERA, Coding.INTERFRAME)
-    assert camera.response.curve is standard_response("linear")
-    assert "H.264" in camera.response.words
-    error_px, u_px = error_and_u_px(camera.response, "srgb")
-    assert u_px == pytest.approx(abs(error_px) / np.sqrt(2.0), rel=0.01)
+def test_what_h264_hides_is_in_the_uncertainty(name: str) -> None:
+    """Each edge has errors of its own, and so much of a tone curve is left that a linear camera is not corrected."""
+    error, u = np.transpose(
+        [
+            error_and_u_px(
+                learnt_from_profiles(h264_profiles(name, seed), ASSUMED_CAMERA, Coding.INTERFRAME).response, name
+            )
+            for seed in range(30, 36)
+        ]
+    )
+    assert np.all(np.abs(error) < 2.0 * u + 1e-6)
+    # An edge of the linear camera is displaced by 0.52 px between the two, one of the other by 0.31 px.
+    assert float(np.sqrt(np.mean(error**2))) < (0.01 if name == "linear" else 0.2)
+    assert float(np.median(u)) < (0.32 if name == "linear" else 0.15)
 
 
 def textured_profiles(seed: int, *, is_told: bool) -> list[EdgeProfile]:
