@@ -14,7 +14,7 @@ from fingervision.vision.profile_lines import INNER, ROWS
 Floats = NDArray[np.float64]
 
 # Extent of a profile to either side: this multiple of the blur plus these pixels, at most the last number of pixels,
-# and at most half of the distance to the next edge.
+# at most half of the distance to the next edge, and within the picture.
 REACH_SIGMAS, REACH_EXTRA_PX, FARTHEST_PX = 4.0, 4.0, 20
 # Degrees of the curve along a flank, in the part far from the tip: a long fillet bends it. Scatter of the rows beyond
 # their noise up to which the lower degree is enough, largest scatter about the curve (pixels), and fewest fitted rows.
@@ -135,9 +135,10 @@ def _one(
 
 
 def _room_px(upright: Levels, edges: EdgePoints, line: Floats) -> float:
-    """Half of the smallest distance from the middle of a flank to another flank."""
+    """Half of the smallest distance from the middle of a flank to another flank; at most that to the border."""
     middle = float(np.median(line))
-    room = float(FARTHEST_PX)
+    # A profile that the border cuts off shows no plateau there.
+    room = min(float(FARTHEST_PX), float(line.min()), upright.shape[1] - 1.0 - float(line.max()))
     for finger in range(2):
         for part in (slice(0, INNER), slice(INNER, ROWS)):
             mine = edges.lines.weight[finger, part] > 0
