@@ -138,7 +138,7 @@ def _room_px(upright: Levels, edges: EdgePoints, line: Floats) -> float:
     """Half of the smallest distance from the middle of a flank to another flank; at most that to the border."""
     middle = float(np.median(line))
     # A profile that the border cuts off shows no plateau there.
-    room = min(float(FARTHEST_PX), float(line.min()), upright.shape[1] - 1.0 - float(line.max()))
+    room = float(min(FARTHEST_PX, line.min(), upright.shape[1] - 1.0 - line.max()))
     for finger in range(2):
         for part in (slice(0, INNER), slice(INNER, ROWS)):
             mine = edges.lines.weight[finger, part] > 0
