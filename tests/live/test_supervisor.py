@@ -81,7 +81,7 @@ def test_a_part_that_fails_is_an_alarm_and_measuring_goes_on(session: Session) -
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [(preview, "section"), (preview, "_picture"), (preview, "_now"), (Session, "state")]
+    ("module", "name"), [(preview, "section"), (preview, "coded"), (preview, "_now"), (Session, "state")]
 )
 def test_a_page_is_told_of_an_error_in_what_it_is_sent(
     module: Any, name: str, session: Session, page: Page, monkeypatch: pytest.MonkeyPatch
