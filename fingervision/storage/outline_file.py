@@ -32,8 +32,9 @@ EXPORTS = (*OUTLINES, ".stl")
 """Endings of the files that are written."""
 _WITHIN_MM = 1e-3
 """Largest distance of the arcs that replace other curves."""
-_JOINED = 1e-5
-"""Distance below which two ends of lines meet, as a share of the drawing's size: CAD programs round to 6 digits."""
+_JOINED, _EQUALLY = 1e-5, 0.1
+"""Distance below which two ends of lines meet, as a share of the drawing's size: CAD programs round to 6 digits; share
+of it within which two ends are equally near."""
 _MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72.0, "pc": 25.4 / 6.0}
 _ACROSS, _BODY = 4.0, 0.025
 """Triangles of a solid across thin parts, and their size over the body's size."""
@@ -164,20 +165,35 @@ def _closed(chains: list[Chain], path: Path) -> list[Polygon]:
     while left:
         vertices, end = chains[first := left.pop()]
         vertices = list(vertices)
-        while np.hypot(*np.subtract(end, ends[first, 0])) > same_mm:
-            near = [(n, side) for n in left for side in (0, 1) if np.hypot(*(ends[n, side] - end)) <= same_mm]
+        # Where shapes were united, sides may be shorter than ends may be apart: the nearest end is the next one.
+        while True:
+            away = sorted((float(np.hypot(*(ends[n, side] - end))), n, side) for n in left for side in (0, 1))
+            home_mm = float(np.hypot(*np.subtract(end, ends[first, 0])))
+            if home_mm <= min(same_mm, away[0][0] if away else same_mm):
+                break
+            near = [each for each in away if each[0] <= min(same_mm, away[0][0] + _EQUALLY * same_mm)]
             if len(near) != 1:
                 what = "ends" if not near else "branches"
                 raise DataError(
                     f"Lines of {path} must form closed outlines, but one {what} at ({end[0]:.6g}, {end[1]:.6g}) mm; "
                     "join it there, or put construction lines on another layer and state the layer of the outline."
                 )
-            n, side = near[0]
+            _, n, side = near[0]
             left.discard(n)
             more, end = chains[n] if side == 0 else _reversed(chains[n])
             vertices += more
-        loops.append(_simplified(vertices))
+        loops.append(_simplified(_without_short(vertices, same_mm)))
     return loops
+
+
+def _without_short(vertices: list[Vertex], same_mm: float) -> list[Vertex]:
+    """Vertices without those whose side is shorter than ends may be apart, as unions of shapes leave them."""
+    after = [at for at, _ in (*vertices[1:], vertices[0])]
+    return [
+        (at, bulge)
+        for (at, bulge), end in zip(vertices, after, strict=True)
+        if np.hypot(*np.subtract(end, at)) > same_mm or abs(bulge) > 1.0
+    ]
 
 
 def _reversed(chain: Chain) -> Chain:
