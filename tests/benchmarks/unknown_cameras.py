@@ -155,7 +155,7 @@ def h264(recording: Recording, curve: Curve, crf: int = 20) -> Film:
     pictures = lossless(recording, curve).pictures
     buffer = io.BytesIO()
     with av.open(buffer, "w", format="matroska") as container:
-        stream = container.add_stream("libx264", rate=25, options={"crf": str(crf), "preset": "medium"})
+        stream = container.add_stream("libx264", rate=25, options={"crf": str(crf), "preset": "medium", "threads": "1"})
         stream.height, stream.width = pictures[0].shape
         stream.pix_fmt = "yuv420p"
         for picture in pictures:
