@@ -19,7 +19,7 @@ NOISE_MM, LOG_NOISE_MM, RESOLUTION_S = 5e-4, 1e-5, 1e-3
 MODEL = {"input_mm": [-0.1, 0.6], "gap_mm": [1.0 - 0.1 * SLOPE, 1.0 + 0.6 * SLOPE]}
 
 
-def filmed(play_mm: float, seed: int) -> MeasuredTable:
+def filmed(play_mm: float, seed: int, log_noise_mm: float = LOG_NOISE_MM) -> MeasuredTable:
     """Frames of a fast motion, whose input is read from a log at times rounded to a millisecond."""
     rng = np.random.default_rng(seed)
 
@@ -34,7 +34,7 @@ def filmed(play_mm: float, seed: int) -> MeasuredTable:
     return measured_from_columns(
         {
             "time_s": stamps_s.tolist(),
-            "input_mm": (driven(stamps_s) + rng.normal(0.0, LOG_NOISE_MM, time_s.size)).tolist(),
+            "input_mm": (driven(stamps_s) + rng.normal(0.0, log_noise_mm, time_s.size)).tolist(),
             "gap_mm": (1.0 + SLOPE * moved + rng.normal(0.0, NOISE_MM, time_s.size)).tolist(),
             "u_random_mm": [NOISE_MM] * time_s.size,
         }
@@ -50,6 +50,11 @@ def test_nothing_is_seen_where_only_times_are_rounded() -> None:
     assert (found.verdict, found.effects) == ("agrees", ())
     # The same residual is no noise of the picture.
     assert fv.diagnose(table, MODEL).verdict != "agrees"
+
+
+def test_a_noisy_log_takes_nothing_from_the_noise_that_the_picture_states() -> None:
+    table = replace(filmed(0.0, seed=7, log_noise_mm=7e-5), stamp_s=RESOLUTION_S)
+    assert fv.diagnose(table, MODEL).verdict == "agrees"
 
 
 def test_a_play_beside_rounded_times_is_named_with_its_uncertainty() -> None:

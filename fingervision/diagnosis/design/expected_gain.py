@@ -56,7 +56,7 @@ def _noises(
     channels = len(whitener.noises)
     residuals = np.split(data.aim_mm - data.chain.stacked(explanation.values), channels)
     drawn = drawn_noises(residuals, history.runs, np.split(whitener.aside, channels), count, rng)
-    return [(without_input(gap, whitener.passing_mm), *others) for gap, *others in drawn]
+    return [(without_input(gap, whitener.passing_mm, data.floors_mm[0]), *others) for gap, *others in drawn]
 
 
 TRUTHS = 16

@@ -260,7 +260,7 @@ class Observations:
             error = np.zeros_like(error)
         held = np.where(self.recorded.stays, error, 0.0)
         passing = np.where(self.recorded.stays, 0.0, error)
-        noises = (without_input(noises[0], passing), *noises[1:])
+        noises = (without_input(noises[0], passing, self.floors_mm[0]), *noises[1:])
         stamps = self.recorded.stamps_mm
         if stamps is not None and np.any(stamps > SEEN_STAMPS * noises[0].total_mm):
             passing = np.hypot(passing, stamps)

@@ -142,7 +142,7 @@ def white_noise(residual: Array, aside: Flags, floor_mm: float, degrees: int) ->
     return Noise(max(spread, floor_mm, 1e-9), 0.0, 0.0)
 
 
-def without_input(noise: Noise, input_mm: Array) -> Noise:
+def without_input(noise: Noise, input_mm: Array, floor_mm: float) -> Noise:
     """Subtract the contribution of the input's random errors, which is also contained in the residual.
 
     Parameters
@@ -151,6 +151,9 @@ def without_input(noise: Noise, input_mm: Array) -> Noise:
         Noise estimated from the residual.
     input_mm : ndarray of float, shape (n,)
         Effect of each recorded input's error on the gap; it is accounted for separately from then on.
+    floor_mm : float
+        Random uncertainty of the measurement itself, which is no error of the input.
     """
+    least = np.clip((floor_mm / noise.total_mm) ** 2, LEAST_SHARE, 1.0)
     share = 1.0 - float(np.mean(input_mm**2)) / noise.total_mm**2
-    return noise.scaled(float(np.sqrt(max(share, LEAST_SHARE))))
+    return noise.scaled(float(np.sqrt(max(share, least))))
