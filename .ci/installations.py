@@ -17,6 +17,7 @@ import sys
 import tempfile
 import tomllib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -33,24 +34,29 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tests", action="store_true", help="run the fast tests in each environment as well")
     tests = parser.parse_args().tests
-    failed = 0
+    failed = False
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         wheel = _wheel(folder)
-        for version, python, constraints in _rows(folder):
-            label = f"Python {version}, {'oldest' if constraints else 'newest'} dependencies"
-            if python is None:
-                print(f"{label}: skipped, because this machine has no python{version}", flush=True)
-                continue
-            try:
-                print(
-                    f"{label}: {_tried(folder / label.replace(' ', '_'), python, wheel, constraints, tests)}",
-                    flush=True,
-                )
-            except (subprocess.CalledProcessError, AssertionError) as error:
-                failed = 1
-                print(f"{label}: FAILED, {error}\n{getattr(error, 'stdout', '')}", flush=True)
+        # Two at a time, because an installation waits for downloads; tests of live views need all of the machine.
+        with ThreadPoolExecutor(1 if tests else 2) as pool:
+            for line, has_failed in pool.map(lambda row: _row(folder, wheel, tests, *row), _rows(folder)):
+                print(line, flush=True)
+                failed |= has_failed
     return failed
+
+
+def _row(
+    folder: Path, wheel: Path, tests: bool, version: str, python: Path | None, constraints: Path | None
+) -> tuple[str, bool]:
+    """The line of the table for one environment, and whether it failed."""
+    label = f"Python {version}, {'oldest' if constraints else 'newest'} dependencies"
+    if python is None:
+        return f"{label}: skipped, because this machine has no python{version}", False
+    try:
+        return f"{label}: {_tried(folder / label.replace(' ', '_'), python, wheel, constraints, tests)}", False
+    except (subprocess.CalledProcessError, AssertionError) as error:
+        return f"{label}: FAILED, {error}\n{getattr(error, 'stdout', '')}", True
 
 
 def oldest_versions() -> list[str]:
