@@ -292,11 +292,26 @@ class _Rows:
 
     def starts_and_stops(self) -> list[Corner]:
         """Find the corners without a reversal, of which the sharpest in its neighbourhood counts."""
-        found = [(self._bend(i), i) for i in range(1, self.u.size - 2)]
-        size = np.zeros(self.u.size + 1)
-        for bend, i in found:
-            size[i] = 0.0 if bend is None else bend[0]
-        return [bend[1] for bend, i in found if bend is not None and size[i] >= max(size[i - 1], size[i + 1])]
+        u, t, n = self.u, self.t, self.u.size
+        before, u_before = _straight_motions(u, t, self.sigma_mm)
+        after, u_after = (values[::-1] for values in _straight_motions(u[::-1], -t[::-1], self.sigma_mm))
+        # Between the rows i and i + 1; motions that are not straight are NaN, and fail every comparison.
+        i, step_s = np.arange(1, n - 2), np.diff(t)
+        rising, falling = before[i], after[i + 1, ::-1]
+        apart, ways = rising - falling, np.stack([np.diff(rising)[:, 0], np.diff(falling)[:, 0]])
+        share = apart[:, 0] / np.where(apart[:, 0] == apart[:, 1], np.inf, apart[:, 0] - apart[:, 1])
+        place = rising[:, 0] + share * ways[0]
+        beside = np.abs(place - (u[i] + share * (u[i + 1] - u[i])))
+        noise = SURELY * np.hypot(np.maximum(u_before[i], u_after[i + 1]), self.sigma_mm)
+        found = np.lib.stride_tricks.sliding_window_view(step_s, 3).max(axis=1) <= self.longest_s
+        found &= (ways[0] * ways[1] >= 0.0) & (apart[:, 0] * apart[:, 1] < 0.0)
+        found &= (share > 1.0 / FINE) & (share < 1.0 - 1.0 / FINE)
+        found &= beside > np.maximum(noise, ROUNDED * np.abs(u[i + 1] - u[i]))
+        size = np.pad(np.where(found, np.abs(ways[1] - ways[0]) / step_s[i], 0.0), 1)
+        found &= size[1:-1] >= np.maximum(size[:-2], size[2:])
+        return [
+            Corner(self.first + int(k), float(t[k] + share[k - 1] * step_s[k]), float(place[k - 1])) for k in i[found]
+        ]
 
     def _rest_at(self, top: int, way: float) -> list[Corner]:
         """Stop and start beside a row at which the stage rested: the row lies on neither continued motion."""
@@ -362,26 +377,38 @@ class _Rows:
         return_s = float(np.interp(least, np.maximum.accumulate(falling[top:][::-1]), at[top:][::-1]))
         return Corner(self.first + i, float(at[top]), way * float(height[top]), way * least, (leave_s, return_s))
 
-    def _bend(self, i: int) -> tuple[float, Corner] | None:
-        """Find the corner between straight motions up to row i and from row i + 1, with the change of speed."""
-        u, t = self.u, self.t
-        if np.max(np.diff(t[i - 1 : i + 3])) > self.longest_s:
-            return None
-        at = t[i : i + 2]
-        before, after = (continued(u, t, k, side, at, self.sigma_mm) for k, side in ((i, -1), (i + 1, 1)))
-        if before is None or after is None or not (before.straight and after.straight):
-            return None
-        apart = before.input_mm - after.input_mm
-        speeds = [float(np.diff(motion.input_mm)[0] / (t[i + 1] - t[i])) for motion in (before, after)]
-        if speeds[0] * speeds[1] < 0.0 or apart[0] * apart[1] >= 0.0:
-            return None
-        share = float(apart[0] / (apart[0] - apart[1]))
-        place = float(before.input_mm[0] + share * np.diff(before.input_mm)[0])
-        beside = abs(place - (u[i] + share * (u[i + 1] - u[i])))
-        noise = SURELY * float(np.hypot(max(before.u_mm, after.u_mm), self.sigma_mm))
-        if not 1.0 / FINE < share < 1.0 - 1.0 / FINE or beside <= max(noise, ROUNDED * abs(u[i + 1] - u[i])):
-            return None
-        return abs(speeds[1] - speeds[0]), Corner(self.first + i, float(t[i] + share * (t[i + 1] - t[i])), place)
+
+def _straight_motions(input_mm: Array, time_s: Array, sigma_mm: float) -> tuple[Array, Array]:
+    """Straight motion up to each row, continued to the next one; NaN where the motion is not straight.
+
+    Returns
+    -------
+    at_mm : ndarray of float, shape (n, 2)
+        The continued input at the row and at the next row.
+    u_mm : ndarray of float, shape (n,)
+        Largest standard uncertainty of both.
+    """
+    at_mm, u_mm = np.full((input_mm.size, 2), np.nan), np.full(input_mm.size, np.nan)
+    ahead_s = np.stack([np.zeros(input_mm.size), np.diff(time_s, append=np.nan)], axis=1)
+    for count in reversed([count for count in STRAIGHT_ROWS if count <= input_mm.size]):
+        u, t = (np.lib.stride_tricks.sliding_window_view(values, count) for values in (input_mm, time_s))
+        middle, rows = u.mean(axis=1), np.arange(count - 1, input_mm.size)
+        lead_s = t.mean(axis=1) - time_s[rows]
+        off_s = t - t.mean(axis=1, keepdims=True)
+        squares = np.sum(off_s**2, axis=1)
+        slope = np.sum(off_s * u, axis=1) / squares
+        away = np.max(np.abs(u - middle[:, None] - slope[:, None] * off_s), axis=1)
+        step_mm = np.abs(slope * (t[:, 0] - t[:, -1])) / (count - 1)
+        straight = away <= SURELY * sigma_mm + ROUNDED * step_mm
+        far_s = ahead_s[rows] - lead_s[:, None]
+        gain = np.sqrt(1.0 / count + np.max(far_s**2, axis=1) / squares)
+        at_mm[rows[straight]] = (middle[:, None] + slope[:, None] * far_s)[straight]
+        u_mm[rows[straight]] = (gain * sigma_mm)[straight]
+    # A stage at rest stays there.
+    rests = 1 + np.flatnonzero(np.abs(np.diff(input_mm)) <= SURELY * np.sqrt(2.0) * sigma_mm)
+    at_mm[rests] = 0.5 * (input_mm[rests] + input_mm[rests - 1])[:, None]
+    u_mm[rests] = sigma_mm
+    return at_mm, u_mm
 
 
 def _with_crossing(at: Array, rising: Array, falling: Array) -> tuple[Array, Array, Array]:

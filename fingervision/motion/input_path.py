@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -226,46 +227,48 @@ def input_path(
     between = turns.points
     if table.path is None and not commanded and not rest.any() and not between:
         return None
-    over = set(turning_readings(table).tolist()) if overshoots else set[int]()
+    step_s = np.diff(time_s, prepend=time_s[0])
     owner_of = np.full(along_mm.size, -1, dtype=np.intp)
     owner_of[rows] = np.arange(rows.size)
-    inputs: list[float] = []
-    times: list[float] = []
-    owners: list[int] = []
-    place = np.zeros(along_mm.size, dtype=np.intp)
-    path_runs: list[slice] = []
+    # Points with their places in the path, in rows: an overshoot and a rest lie before a row, a corner lies after it.
+    over = turning_readings(table) if overshoots else np.zeros(0, dtype=np.intp)
+    beyond_mm = along_mm[over] + OVERSHOOT * (along_mm[over - 1] - along_mm[over - 2])
+    rested = np.flatnonzero(rest)
+    # A command keeps its old value until the sample at which the new value is recorded.
+    held = np.repeat(_beside_jumps(along_mm, time_s, runs, rest) if commanded else rested[:0], FINE_STEPS - 1)
+    share = np.resize(np.arange(1, FINE_STEPS) / FINE_STEPS, held.size)
+    turned = [(row, at_s, at_mm) for row, points in between.items() for at_s, at_mm in points]
+    after, turned_s, turned_mm = np.array(turned, dtype=np.float64).reshape(-1, 3).T
+    nobody = np.full(over.size + after.size, -1)
+    places = np.concatenate([np.arange(along_mm.size), over - 0.75, rested - 0.5, held - 0.5, after + 0.5])
+    inputs = np.concatenate([along_mm, beyond_mm, along_mm[rested], along_mm[held - 1], turned_mm])
+    times = np.concatenate(
+        [
+            time_s,
+            time_s[over - 1] + 0.5 * ARRIVED * step_s[over],
+            time_s[rested - 1] + ARRIVED * step_s[rested],
+            time_s[held - 1] + step_s[held] * share,
+            turned_s,
+        ]
+    )
+    owners = np.concatenate([owner_of, nobody[: over.size], owner_of[rested], owner_of[held - 1], nobody[over.size :]])
+    order = np.argsort(places, kind="stable")
+    borders = np.searchsorted(places[order], [run.start for run in runs] + [along_mm.size]).tolist()
+    path_runs = tuple(slice(begin, end) for begin, end in pairwise(borders))
+    along = replace(history, input_mm=inputs[order], time_s=times[order], runs=path_runs)
+    return InputPath(along, np.searchsorted(places[order], rows), owners[order])
+
+
+def _beside_jumps(along_mm: Array, time_s: Array, runs: tuple[slice, ...], rest: Flags) -> NDArray[np.intp]:
+    """Rows at which a command jumps, and the rows soon after them, without the first row of a run."""
+    found = []
     for run in runs:
-        begin, jumped_s = len(inputs), -np.inf
-        for i in range(run.start, run.stop):
-            step_s = time_s[i] - time_s[i - 1] if i > run.start else 0.0
-            if i in over:
-                inputs.append(along_mm[i] + OVERSHOOT * (along_mm[i - 1] - along_mm[i - 2]))
-                times.append(time_s[i - 1] + 0.5 * ARRIVED * step_s)
-                owners.append(-1)
-            if rest[i]:
-                inputs.append(along_mm[i])
-                times.append(time_s[i - 1] + ARRIVED * step_s)
-                owners.append(int(owner_of[i]))
-            elif commanded and i > run.start:
-                jumps = along_mm[i] != along_mm[i - 1]
-                jumped_s = time_s[i] if jumps else jumped_s
-                if jumps or time_s[i] - jumped_s < FINE_S:
-                    # A command keeps its old value until the sample at which the new value is recorded.
-                    inputs += [along_mm[i - 1]] * (FINE_STEPS - 1)
-                    times += [time_s[i - 1] + step_s * k / FINE_STEPS for k in range(1, FINE_STEPS)]
-                    owners += [int(owner_of[i - 1])] * (FINE_STEPS - 1)
-            place[i] = len(inputs)
-            inputs.append(along_mm[i])
-            times.append(time_s[i])
-            owners.append(int(owner_of[i]))
-            for at_s, at_mm in between.get(i, ()):
-                inputs.append(at_mm)
-                times.append(at_s)
-                owners.append(-1)
-        path_runs.append(slice(begin, len(inputs)))
-    along = replace(history, input_mm=np.array(inputs), time_s=np.array(times), runs=tuple(path_runs))
-    places: NDArray[np.intp] = place[rows]
-    return InputPath(along, places, np.array(owners, dtype=np.intp))
+        jumps = np.diff(along_mm[run], prepend=along_mm[run.start]) != 0.0
+        jumped_s = np.maximum.accumulate(np.where(jumps, time_s[run], -np.inf))
+        near = jumps | (time_s[run] - jumped_s < FINE_S)
+        near[0] = False
+        found.append(run.start + np.flatnonzero(near & ~rest[run]))
+    return np.concatenate(found)
 
 
 def dwell_s(table: MeasuredTable) -> float:

@@ -17,6 +17,8 @@ from fingervision.domain.effect import Array
 
 MOST_STEPS = 8
 """Most linearised steps for the places: the gap depends on them nearly linearly, up to the row that a play reaches."""
+NEXT_FIT = 7
+"""Most iterations of the fit after each step: it begins at the fit before, which is near."""
 SETTLED = 0.02
 """Change of the places, as a share of their range, below which they are final."""
 TO_SD = 1.4826
@@ -130,7 +132,7 @@ def _settled(data: Observations, explanation: Explanation) -> Turned:
     """Estimate the places step by step, jointly with the parameters of an explanation."""
     for _ in range(MOST_STEPS):
         problem = _beside_reversals(data, explanation)
-        explanation = fit(problem, explanation.names, explanation.values, iterations=20)
+        explanation = fit(problem, explanation.names, explanation.values, iterations=NEXT_FIT)
         short_by = np.array(data.turns.short_by)
         information, pull = _normal_equations(data, problem, explanation)
         root = np.linalg.cholesky(information)

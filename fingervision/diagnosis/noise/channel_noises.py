@@ -93,10 +93,10 @@ def powers(residual: Array, runs: tuple[slice, ...], aside: Flags, slow: float) 
     return np.concatenate(found)
 
 
-def shape(angle: Array, share: float, phi: float) -> Array:
+def shape(angle: Array, share: Array | float, phi: Array | float) -> Array:
     """Noise spectrum of unit variance, of which a share `share` has the correlation `phi` between neighbouring samples.
 
-    The spectrum has shape (m,).
+    The spectrum has shape (m,), or (k, m) for shares and correlations of shape (k, 1).
     """
     correlated = (1.0 - phi**2) / (1.0 + phi**2 - 2.0 * phi * np.cos(angle))
     return np.asarray(1.0 - share + share * correlated, dtype=np.float64)
@@ -121,12 +121,12 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
     mixed = [(share, phi) for share in np.linspace(0.1, 0.9, 9) for phi in CORRELATIONS]
     kinds = ([(0.0, 0.0)], [(1.0, phi) for phi in CORRELATIONS], mixed)
     tried = np.array([each for kind in kinds for each in kind])
-    forms = np.array([shape(angle, share, phi) for share, phi in tried])
+    forms = shape(angle, *tried.T[:, :, None])
     levels = [np.log(_variances(power, kept, forms)) for power, kept in zip(powers, use, strict=True)]
     costs = sum(
         kept.sum() * level + np.log(forms[:, kept]).sum(axis=1) for kept, level in zip(use, levels, strict=True)
     )
-    slow = np.mean(levels, axis=0) + np.log([shape(SLOWEST, share, phi)[0] for share, phi in tried])
+    slow = np.mean(levels, axis=0) + np.log(shape(SLOWEST, *tried.T))
     found: list[tuple[float, float, float]] = []
     begin = 0
     for kind in kinds:

@@ -82,7 +82,7 @@ def gate(
     sigma = max(1.4826 * float(middle), float(far) / 1.645)
     if sigma > 0.0:
         out = np.abs(rest) > sigmas * sigma
-        if ordered:
+        if ordered and out.any():
             there = _recurring(out, [*_places(input_mm), *_after_steps(input_mm, runs), _at_jumps(change_mm)])
             for i in 2 + np.flatnonzero(np.convolve(out, np.ones(5))[4:-4] >= CROWDED):
                 if out[i - 2 : i + 3].sum() >= CROWDED:
@@ -94,9 +94,10 @@ def gate(
 def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
     """Mark parts of the range with more deviating samples than gross errors would cause, which occur anywhere."""
     there = np.zeros(out.size, dtype=bool)
-    for part in parts:
-        by_chance = hypergeom.sf(out[part].sum() - 1, out.size, int(out.sum()), part.size)
-        there[part] |= by_chance < BY_CHANCE / len(parts)
+    counts, sizes = np.array([[out[part].sum(), part.size] for part in parts]).T
+    by_chance = hypergeom.sf(counts - 1, out.size, int(out.sum()), sizes)
+    for number in np.flatnonzero(by_chance < BY_CHANCE / len(parts)):
+        there[parts[number]] = True
     return there
 
 
