@@ -43,21 +43,22 @@ class BlurredStep:
         The properties of the optics.
     step, slope : ndarray of float, shape (COUNT,)
         The step, and its derivative with respect to the coordinate.
-    by_pixels : bool
-        Whether pixels were smoothed, rather than the light on them.
+    point : _Point
+        Spectrum of a point of light.
     """
 
     optics: Floats
     step: Floats
     slope: Floats
-    by_pixels: bool
+    point: "_Point"
 
     @classmethod
     def of(cls, optics: Floats, by_pixels: bool = False) -> "BlurredStep":
-        """Step for the properties of the optics, shape (OPTICS,)."""
-        spectrum, _, _, _ = _spectra(optics, by_pixels)
+        """Step for the properties of the optics, shape (OPTICS,); with `by_pixels`, pixels were smoothed."""
+        point = _Point.of(optics, by_pixels)
+        spectrum = point.base * point.tails
         step, slope = _tables(np.array([spectrum * _INTEGRAL, spectrum]))
-        return cls(optics, step + _RAMP, slope, by_pixels)
+        return cls(optics, step + _RAMP, slope, point)
 
     def at(self, x: Floats) -> tuple[Floats, Floats]:
         """Step and its slope at coordinates of any shape."""
@@ -72,44 +73,67 @@ class BlurredStep:
 
     def by_optics(self, x: Floats) -> Floats:
         """Derivatives of the step with respect to the optics, shape (OPTICS, ...) for coordinates of shape (...)."""
-        _, width, disc, tails = _spectra(self.optics, self.by_pixels)
-        base, longer, larger, smaller = tails
-        changes = [width + disc + longer, disc, base * larger, base * smaller, longer]
-        tables = _tables(np.array(changes) * _INTEGRAL)
+        tables = _tables(np.array(self.point.changes(*self.optics[2:4])) * _INTEGRAL)
         k, t = _places(x)
         return np.asarray(tables[:, k] * (1.0 - t) + tables[:, k + 1] * t)
 
 
-def _spectra(optics: Floats, by_pixels: bool) -> tuple[Floats, Floats, Floats, tuple[Floats, Floats, Floats, Floats]]:
-    """Spectrum of a point of light, its changes by a wider Gaussian and disc, and what makes those by the tails."""
-    sigma, disc, length = np.exp(np.clip(optics[[0, 1, 4]], *LOGARITHMS))
-    w = _ROTATIONS * sigma
-    radius = np.maximum(w * disc, 1e-9)
-    gaussian, by_width = _gaussian(sigma, by_pixels)
-    gaussian, by_width = gaussian * _PIXEL, by_width * _PIXEL
-    airy = 2.0 * j1(radius) / radius
-    larger, smaller = 1.0 / (1.0 + 1j * w * length) - 1.0, 1.0 / (1.0 - 1j * w * length) - 1.0
-    a, b = optics[2:4]
-    tails = 1.0 + a * larger + b * smaller
-    base = gaussian * airy
-    spectrum = base * tails
-    # The derivative of 2 J1(z) / z is -2 J2(z) / z, and J2(z) = 2 J1(z) / z - J0(z).
-    by_disc = -2.0 * gaussian * (airy - j0(radius)) * tails
-    by_length = base * (a * larger * (larger + 1.0) + b * smaller * (smaller + 1.0))
-    return spectrum, by_width * airy * tails, by_disc, (base, by_length, larger, smaller)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    """Spectrum of a point of light, `base * tails`, and what its derivatives need.
 
+    Parameters
+    ----------
+    squares, each, total : ndarray of float
+        Squares of sigma times the rotations, the Gaussian of each of their repetitions, and its sum over them.
+    gaussian, airy, base : ndarray of float
+        Spectra of the Gaussian over the pixel and of the disc, and their product.
+    radius : ndarray of float
+        Radius of the disc times the rotations.
+    larger, smaller, tails : ndarray of complex
+        Change by light in the tail to either side, and of all light.
+    """
 
-def _gaussian(sigma: float, by_pixels: bool) -> tuple[Floats, Floats]:
-    """Spectrum of a Gaussian, and its derivative with respect to ln sigma."""
-    squares = (sigma * (_ROTATIONS + (_REPEATED if by_pixels else 0.0))) ** 2
-    each = np.atleast_2d(np.exp(-0.5 * squares))
-    total, change = each.sum(axis=0), -(squares * each).sum(axis=0)
-    return total / total[0], (change - total * (change[0] / total[0])) / total[0]
+    squares: Floats
+    each: Floats
+    total: Floats
+    gaussian: Floats
+    airy: Floats
+    base: Floats
+    radius: Floats
+    larger: Floats
+    smaller: Floats
+    tails: Floats
+
+    @classmethod
+    def of(cls, optics: Floats, by_pixels: bool) -> "_Point":
+        sigma, disc, length = np.exp(np.clip(optics[[0, 1, 4]], *LOGARITHMS))
+        w = _ROTATIONS * sigma
+        squares = np.atleast_2d((sigma * (_ROTATIONS + (_REPEATED if by_pixels else 0.0))) ** 2)
+        each = np.exp(-0.5 * squares)
+        total = each.sum(axis=0)
+        gaussian = total / total[0] * _PIXEL
+        radius = np.maximum(w * disc, 1e-9)
+        airy = 2.0 * j1(radius) / radius
+        larger, smaller = 1.0 / (1.0 + 1j * w * length) - 1.0, 1.0 / (1.0 - 1j * w * length) - 1.0
+        tails = 1.0 + optics[2] * larger + optics[3] * smaller
+        return cls(squares, each, total, gaussian, airy, gaussian * airy, radius, larger, smaller, tails)
+
+    def changes(self, a: float, b: float) -> list[Floats]:
+        """Derivatives with respect to the optics, of which `a` and `b` are the shares of light in the tails."""
+        change = -(self.squares * self.each).sum(axis=0)
+        wider = (change - self.total * (change[0] / self.total[0])) / self.total[0] * _PIXEL * self.airy * self.tails
+        # The derivative of 2 J1(z) / z is -2 J2(z) / z, and J2(z) = 2 J1(z) / z - J0(z).
+        disc = -2.0 * self.gaussian * (self.airy - j0(self.radius)) * self.tails
+        larger, smaller = self.larger, self.smaller
+        longer = self.base * (a * larger * (larger + 1.0) + b * smaller * (smaller + 1.0))
+        return [wider + disc + longer, disc, self.base * larger, self.base * smaller, longer]
 
 
 def _tables(spectra: Floats) -> Floats:
     """Functions over the coordinates from their spectra, shape (functions, COUNT)."""
-    return np.asarray(np.fft.fftshift(np.fft.irfft(spectra, COUNT), axes=-1) / SPACING_PX)
+    tables = np.fft.irfft(spectra, COUNT) / SPACING_PX
+    return np.concatenate([tables[:, COUNT // 2 :], tables[:, : COUNT // 2]], axis=-1)
 
 
 def _places(x: Floats) -> tuple[NDArray[np.intp], Floats]:
