@@ -14,7 +14,7 @@ from fingervision.vision.pipeline import Settings, measure_frame
 
 # A bound on what may have moved the edges is taken for a standard uncertainty.
 SIGMAS = 2.0
-POSITIONS = 6
+POSITIONS = 3
 
 
 def _measured(number: int, camera: Camera, **options: object) -> tuple[GapMeasurement | NoGap, float]:

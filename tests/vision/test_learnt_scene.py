@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calib.calibration import BareScale
-from fingervision.domain.camera import BesideEdges, CameraModel
+from fingervision.domain.camera import ASSUMED_CAMERA, BesideEdges, CameraModel
 from fingervision.domain.direction import Direction
 from fingervision.domain.gap import GapMeasurement
 from fingervision.measuring.camera_learning import camera_of
@@ -28,15 +28,23 @@ def errors(film: Film, recording: Recording, camera: CameraModel, *, only_steps:
     return np.array(found).T
 
 
-def learnt(film: Film) -> CameraModel:
-    return camera_of(list(film), Settings(BELOW_PX, Direction.UP), BareScale(PX_PER_MM))
+def learnt(film: Film, before: CameraModel = LINEAR_CAMERA) -> CameraModel:
+    return camera_of(list(film), Settings(BELOW_PX, Direction.UP, camera=before), BareScale(PX_PER_MM))
 
 
-@pytest.mark.parametrize("name", SURFACES)
-def test_what_stands_beside_the_edges_is_learnt_and_taken_off(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "before"),
+    [
+        ("glare", LINEAR_CAMERA),
+        ("wall", ASSUMED_CAMERA),
+        *(pytest.param(name, ASSUMED_CAMERA, marks=pytest.mark.slow) for name in ("glare", "shadow")),
+        pytest.param("shadow", LINEAR_CAMERA, marks=pytest.mark.slow),
+    ],
+)
+def test_what_stands_beside_the_edges_is_learnt_and_taken_off(name: str, before: CameraModel) -> None:
     recording = drawn(9301, 5, SURFACES[name])
     film = lossless(recording, CURVES["linear"])
-    camera = learnt(film)
+    camera = learnt(film, before)
     assert isinstance(camera.beside, BesideEdges)
     assert camera.beside.name == name
     error, u = errors(film, recording, camera)
@@ -50,7 +58,12 @@ def test_a_deep_shadow_is_taken_off_the_whole_outline() -> None:
     """A shadow displaces a step by more or less on a rounded tip than on a flank."""
     recording = drawn(9311, 5, Surface(shadow=0.4))
     film = lossless(recording, CURVES["linear"])
-    error, u = errors(film, recording, learnt(film))
+    camera = learnt(film)
+    assert camera.beside is not None
+    assert camera.beside.name == "shadow"
+    error, u = errors(film, recording, camera)
+    alone, _ = errors(film, recording, camera, only_steps=True)
+    assert np.abs(alone).min() > 0.25, "nothing would be shown by this recording"
     assert np.abs(error).max() < 0.1
     assert np.all(np.abs(error) < 2.0 * u)
 
@@ -60,7 +73,7 @@ def test_a_deep_shadow_is_taken_off_the_whole_outline() -> None:
 def test_a_tone_curve_does_not_hide_what_stands_beside_the_edges(name: str) -> None:
     recording = drawn(9301, 5, SURFACES[name])
     film = lossless(recording, srgb)
-    camera = learnt(film)
+    camera = learnt(film, ASSUMED_CAMERA)
     assert isinstance(camera.beside, BesideEdges)
     assert camera.beside.name == name
     error, u = errors(film, recording, camera)
@@ -70,7 +83,7 @@ def test_a_tone_curve_does_not_hide_what_stands_beside_the_edges(name: str) -> N
 def test_a_bare_edge_is_left_where_it_is() -> None:
     recording = drawn(9302, 5)
     film = lossless(recording, CURVES["linear"])
-    camera = learnt(film)
+    camera = learnt(film, ASSUMED_CAMERA)
     assert camera.beside is None
     error, u = errors(film, recording, camera)
     assert np.all(np.abs(error) < 3.0 * u)
@@ -82,5 +95,5 @@ def test_a_clipped_ground_is_no_sign_of_anything_beside_the_edges() -> None:
     film = lossless(
         replace(recording, light=tuple(1.02 / brightest * light for light in recording.light)), CURVES["linear"]
     )
-    camera = camera_of(list(film), Settings(BELOW_PX, Direction.UP, camera=LINEAR_CAMERA), BareScale(PX_PER_MM))
+    camera = learnt(film)
     assert camera.beside is None

@@ -7,14 +7,15 @@ import pytest
 
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.vision.pipeline import Settings
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
 from fingervision.vision.single_picture import measure_picture
 from tests.benchmarks.scenes.bench_things import THINGS
 from tests.benchmarks.scenes.canvas import Canvas
 from tests.benchmarks.scenes.gripper import BELOW_PX
 from tests.benchmarks.scenes.shapes import Finger, box, gap_between
 
-SETTINGS = Settings(BELOW_PX)
+# The drawings are linear in light.
+SETTINGS = Settings(BELOW_PX, camera=LINEAR_CAMERA)
 DARK, LIGHT, GREY = 45.0, 190.0, 150.0
 
 
@@ -32,7 +33,7 @@ def painted(pair: tuple[Finger, Finger]) -> Canvas:
 
 def measured(canvas: Canvas, turns: int = 0) -> GapMeasurement | NoGap:
     picture = canvas.shot(1.0, 2.0, np.random.default_rng(7))
-    return measure_picture(Frame(np.ascontiguousarray(np.rot90(picture, turns)), 0), SETTINGS)
+    return measure_frame(Frame(np.ascontiguousarray(np.rot90(picture, turns)), 0), SETTINGS)
 
 
 @pytest.mark.parametrize("turns", [0, 1])
@@ -71,7 +72,7 @@ def test_a_shadow_on_one_inner_side_is_no_motion() -> None:
         canvas.fill(finger.outline() + np.array([6.0, 6.0]), 0.45 * LIGHT, soft_px=0.8)
     for finger in pair:
         canvas.fill(finger.outline(), DARK)
-    found = measured(canvas)
+    found = measure_picture(Frame(canvas.shot(1.0, 2.0, np.random.default_rng(7)), 0), SETTINGS)
     if isinstance(found, GapMeasurement):
         truth = gap_between(*pair, BELOW_PX)
         assert abs(found.gap_px - truth) < max(0.1, 2.0 * np.hypot(found.u_gap_px, found.u_shift_px)), (found, truth)
