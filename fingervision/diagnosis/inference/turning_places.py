@@ -13,7 +13,7 @@ from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.signatures import derivatives
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.noise_model import Noise
-from fingervision.domain.effect import Array
+from fingervision.domain.effect import Array, Flags
 
 MOST_STEPS = 8
 """Most linearised steps for the places: the gap depends on them nearly linearly, up to the row that a play reaches."""
@@ -85,7 +85,7 @@ def _likelier(data: Observations, found: Findings) -> Turned | None:
 
     All are judged by the least noise that any of them leaves, and by every row that any of them explains.
     """
-    tried = [Turned(data, problem_of(data, e), e, data.turns.price) for e in _depending(found)]
+    tried = [Turned(data, problem_of(data, e), e, data.turns.price) for e in _depending(data, found)]
     if not tried:
         return None
     if data.turns.uncertain:
@@ -105,10 +105,11 @@ def _likelier(data: Observations, found: Findings) -> Turned | None:
     return tried[best] if costs[best] < now - LEAST_GAIN else None
 
 
-def _depending(found: Findings) -> list[Explanation]:
+def _depending(data: Observations, found: Findings) -> list[Explanation]:
     """Explanations whose prediction can depend on where the stage turned.
 
-    These are the best, the likeliest single effects, and the best with each of these added.
+    These are the best, the likeliest single effects, and the best with each of these added, unless the rows that do not
+    depend on it refute them.
     """
     effects, best = found.problem.effects, found.best
     single = [e for e in found.singles if effects[e.names[0]].memory or effects[e.names[0]].delay_s is not None]
@@ -118,7 +119,20 @@ def _depending(found: Findings) -> list[Explanation]:
         if best.names and one.names[0] not in best.names:
             names = tuple(name for name in effects if name in {*best.names, *one.names})
             tried.append(fit(found.problem, names, {**best.values, **one.values}, iterations=20))
-    return tried
+    return [e for e in tried if e is best or not _refuted(data, found, e)]
+
+
+def _refuted(data: Observations, found: Findings, explanation: Explanation) -> bool:
+    """Whether an explanation leaves more in the rows that show no place than the best one leaves in all rows."""
+    problem = found.problem
+    whitener = replace(problem.whitener, aside=problem.whitener.aside | _shown(data, explanation))
+    rest = problem.judged_by(whitener, data.aim_mm)
+    return fit(rest, explanation.names, explanation.values, iterations=NEXT_FIT).score > found.best.score
+
+
+def _shown(data: Observations, explanation: Explanation) -> Flags:
+    """Rows of the stacked channels whose prediction depends on where the stage turned; shape (m,)."""
+    return np.asarray(np.any(data.turn_columns_mm(explanation.values) != 0.0, axis=1))
 
 
 def _turned(data: Observations, explanation: Explanation) -> Turned:
@@ -155,7 +169,7 @@ def _beside_reversals(data: Observations, explanation: Explanation) -> Problem:
     """
     values = explanation.values
     parts = np.split(data.stacked_mm - data.chain.stacked(values), len(data.channels))
-    shows = np.any(data.turn_columns_mm(values) != 0.0, axis=1)
+    shows = _shown(data, explanation)
     aside = [
         out & ~own for out, own in zip(data.outliers(parts, explained=True), np.split(shows, len(parts)), strict=True)
     ]

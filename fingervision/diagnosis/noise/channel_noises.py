@@ -20,6 +20,9 @@ CORRELATIONS = tuple(float(phi) for phi in np.linspace(0.05, 0.95, 46))
 """Correlations of neighbouring samples that are tried, as dense as a record of 2500 samples can distinguish."""
 SLOWEST = 2.0 * np.pi * np.array([0.01])
 """Frequency at which the effects of a gripper have most of their power: about one period in a hundred samples."""
+BANDS = 512
+"""Number of bands of equal width in which a spectrum that is tried counts as constant: at the largest correlation that
+is tried, it changes over a tenth of a radian."""
 LINE = 9.0
 """Ratio of a periodogram value to its expectation above which it is a spectral line, not noise."""
 LEAST_RUN = 24
@@ -121,11 +124,14 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
     mixed = [(share, phi) for share in np.linspace(0.1, 0.9, 9) for phi in CORRELATIONS]
     kinds = ([(0.0, 0.0)], [(1.0, phi) for phi in CORRELATIONS], mixed)
     tried = np.array([each for kind in kinds for each in kind])
-    forms = shape(angle, *tried.T[:, :, None])
-    levels = [np.log(_variances(power, kept, forms)) for power, kept in zip(powers, use, strict=True)]
-    costs = sum(
-        kept.sum() * level + np.log(forms[:, kept]).sum(axis=1) for kept, level in zip(use, levels, strict=True)
-    )
+    # A spectrum hardly changes between neighbouring frequencies, and runs of equal length have the same ones.
+    _, alike = np.unique(np.floor(angle * (BANDS / np.pi)), return_inverse=True)
+    forms = shape(np.bincount(alike, angle) / np.bincount(alike), *tried.T[:, :, None])
+    counts = [np.bincount(alike, kept) for kept in use]
+    sums = [np.bincount(alike, power * kept) for power, kept in zip(powers, use, strict=True)]
+    inverse, logarithm = 1.0 / forms, np.log(forms)
+    levels = [np.log(np.maximum(inverse @ one / n.sum(), 1e-24)) for one, n in zip(sums, counts, strict=True)]
+    costs = sum(n.sum() * level + logarithm @ n for n, level in zip(counts, levels, strict=True))
     slow = np.mean(levels, axis=0) + np.log(shape(SLOWEST, *tried.T))
     found: list[tuple[float, float, float]] = []
     begin = 0
@@ -141,14 +147,9 @@ def _likeliest(angle: Array, powers: list[Array], use: list[Flags]) -> tuple[lis
     order = np.argsort(slow)
     reached = np.cumsum(likely[order]) / likely.sum()
     low, high = np.interp((0.159, 0.841), reached, slow[order])
-    form = shape(angle, share, phi)[None]
-    best = [float(_variances(power, kept, form)[0]) for power, kept in zip(powers, use, strict=True)]
+    flat = [power / shape(angle, share, phi) for power in powers]
+    best = [max(float(np.mean(power[kept])), 1e-24) for power, kept in zip(flat, use, strict=True)]
     return best, share, max(phi, 1e-3), 0.5 * float(high - low)
-
-
-def _variances(power: Array, kept: Flags, forms: Array) -> Array:
-    """Variance of one sample, for each form of the spectrum; shape (k,)."""
-    return np.asarray(np.maximum((power[kept] / forms[:, kept]).mean(axis=1), 1e-24), dtype=np.float64)
 
 
 FEWEST_STANDING = 60
