@@ -74,22 +74,6 @@ def test_a_folder_that_cannot_be_made_is_refused(tables: tuple[Path, Path]) -> N
         )
 
 
-def test_the_user_may_insist_on_an_effect(tables: tuple[Path, Path], tmp_path: Path) -> None:
-    command = [
-        "diagnose",
-        str(tables[0]),
-        "--model",
-        str(tables[1]),
-        "--out",
-        str(tmp_path),
-        "--with",
-        "input_offset",
-        "--json",
-    ]
-    report = json.loads(CliRunner().invoke(cli, command).output)
-    assert "input_offset" in [effect["name"] for effect in report["effects"]]
-
-
 def test_compare_says_where_in_a_sentence(tables: tuple[Path, Path], tmp_path: Path) -> None:
     done = CliRunner().invoke(cli, ["compare", str(tables[0]), "--model", str(tables[1]), "--out", str(tmp_path)])
     assert "mm larger than simulated" in done.output

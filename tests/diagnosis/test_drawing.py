@@ -69,8 +69,9 @@ def test_what_was_changed_is_named(diagnosed: Diagnosed, case: str, force: bool)
     assert report.disagreement.after_rms_mm < NOISE_SHARE * EDGE_MM
 
 
-def test_thinner_hinges_are_out_of_reach_without_a_force(diagnosed: Diagnosed) -> None:
-    report, _ = diagnosed("hinges", False)
+@pytest.mark.parametrize("case", ["link", pytest.param("hinges", marks=pytest.mark.slow)])
+def test_thinner_hinges_are_out_of_reach_without_a_force(diagnosed: Diagnosed, case: str) -> None:
+    report, _ = diagnosed(case, False)
     reasons = {entry["name"]: entry["reason"] for entry in report.excluded}
     assert "no force_n" in reasons["hinge_stiffness_error"]
     assert all("hinge_stiffness_error" not in group for group in (names(report), *report.alternatives))

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 EDGE_MM = 0.01
 SAMPLES = 160
 SEED = 5
-DRAWS = 50
+DRAWS = 20
 KINK = 0.1
 FORMS = {
     "encoder_cyclic_error": {"amplitude_mm": 0.02, "period_mm": 0.5, "phase_rad": 0.0},
@@ -66,7 +66,7 @@ def claimed(problem: Problem, change: Array, rng: np.random.Generator) -> bool:
 
 def test_noise_alone_is_hardly_ever_taken_for_an_effect(tmp_path: Path) -> None:
     problem, rng = problem_of(tmp_path, np.zeros(SAMPLES)), np.random.default_rng(SEED)
-    assert sum(claimed(problem, np.zeros(2 * SAMPLES), rng) for _ in range(DRAWS)) <= 1
+    assert sum(claimed(problem, np.zeros(2 * SAMPLES), rng) for _ in range(DRAWS)) == 0
 
 
 @pytest.mark.parametrize("name", FORMS)
@@ -74,7 +74,7 @@ def test_an_effect_of_seven_standard_deviations_is_found(tmp_path: Path, name: s
     problem, rng = problem_of(tmp_path, np.zeros(SAMPLES)), np.random.default_rng(SEED)
     change = problem.whitened({name: FORMS[name]}) - problem.whitened({})
     change *= 7.0 / np.sqrt(problem.offsets.squared(change, problem.offsets.metric((0.0, 0.0))))
-    assert sum(claimed(problem, change, rng) for _ in range(10)) >= 8
+    assert sum(claimed(problem, change, rng) for _ in range(5)) >= 4
 
 
 def test_three_effects_that_imitate_a_kink_give_way_to_it(tmp_path: Path) -> None:

@@ -90,21 +90,19 @@ def test_the_judge_recovers_what_is_hidden_from_a_curve_without_noise() -> None:
     assert checked > 0
 
 
-def _first(row: str, name: str) -> Experiment:
-    drawn = (draw_experiment(seed, ROWS[row]) for seed in range(SEED, SEED + 60))
-    return next(e for e in drawn if e.plant.hidden[0].name == name)
-
-
 def test_the_judge_finds_where_a_play_starts() -> None:
-    experiment = _first("start_3", "backlash")
+    experiment = draw_experiment(SEED + 1, ROWS["start_3"])
+    assert experiment.plant.hidden[0].name == "backlash"
     search, target = search_of(experiment, experiment.traces(), known_input=False)
     starts = own_fit(search, experiment, target).effects[RUN_START]
     assert starts == pytest.approx(experiment.plant.run_start, abs=START_TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_play_that_stays_engaged_belongs_to_the_set_of_an_offset() -> None:
-    experiment = _first("start_poor", "input_offset")
+    experiment = draw_experiment(SEED + 8, ROWS["start_poor"])
     (hidden,) = experiment.plant.hidden
+    assert hidden.name == "input_offset"
     # The single run moves up, so that an engaged play lags by half of its width.
     behind = replace(hidden, parameters={"offset_mm": -abs(hidden.parameters["offset_mm"])})
     judgement = judge(replace(experiment, plant=replace(experiment.plant, hidden=(behind,))))

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from fingervision.cli import cli
 
 
-def test_targets_in_figures_out(tmp_path: Path) -> None:
+def test_targets_in_figures_out_with_an_effect_on_request(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     lines = ["target_mm,cycle,direction,deviation_um"]
     for cycle in range(1, 6):
@@ -18,10 +18,13 @@ def test_targets_in_figures_out(tmp_path: Path) -> None:
     measured, model, out = (tmp_path / name for name in ("measured.csv", "simulation.csv", "out"))
     measured.write_text("\n".join(lines) + "\n")
     model.write_text("input_mm,gap_mm\n-3,-3\n3,3\n")
-    done = CliRunner().invoke(cli, ["diagnose", str(measured), "--model", str(model), "--out", str(out)])
+    words = ["--model", str(model), "--out", str(out), "--with", "input_offset"]
+    done = CliRunner().invoke(cli, ["diagnose", str(measured), *words])
     assert done.exit_code == 0, done.output
     assert "Read as an ISO 230-2 table: 7 targets, 5 cycles" in done.output
-    section = json.loads((out / "report.json").read_text())["iso230"]
+    report = json.loads((out / "report.json").read_text())
+    assert "input_offset" in [effect["name"] for effect in report["effects"]]
+    section = report["iso230"]
     readings = {(w, t): [] for w in ("up", "down") for t in range(-3, 4)}
     for line in lines[1:]:
         target, _, word, deviation = line.split(",")

@@ -1,6 +1,5 @@
 """Rows that are excluded from the verdict are listed and drawn, and every count that includes them states it."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,13 +8,14 @@ import pytest
 from numpy.typing import NDArray
 
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
-from fingervision.diagnosis.report.answer_files import write_answer
 from fingervision.diagnosis.report.figure_files import residual_figure
+from fingervision.diagnosis.report.report_page import report_page
 from fingervision.diagnosis.report.sentences import within_clock
 from fingervision.domain.report import Place
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from fingervision.storage.provenance import AUTHORS, RELEASED, provenance
+from fingervision.storage.summary_json import report_document
 
 WRONG = (100, 250, 400)
 OFFSET_MM, SPAN_MM = 0.02, 1.0
@@ -68,18 +68,14 @@ def test_the_scale_of_a_figure_is_that_of_the_rows_that_count(found: Diagnosis) 
     assert "3 of 3 rows left out lie outside the plot" in axes.get_title("right")
 
 
-def test_the_page_scales_to_the_rows_that_count_and_is_citable(folder: Path, found: Diagnosis, tmp_path: Path) -> None:
-    table = folder / "measured.csv"
-    made = provenance({"measured": table}, "fingervision diagnose")
-    write_answer(tmp_path, found, read_model(folder / "simulation.csv"), made, table)
-    page = (tmp_path / "report.html").read_text()
+def test_the_page_scales_to_the_rows_that_count_and_is_citable(folder: Path, found: Diagnosis) -> None:
+    page = report_page(found, provenance({"measured": folder / "measured.csv"}, "fingervision diagnose"), "")
     assert "3 of 3 rows left out lie outside the plot" in page
     assert f"{AUTHORS} ({RELEASED}). fingervision" in page
     cff = Path("CITATION.cff").read_text()
     assert AUTHORS in cff
     assert f"date-released: {RELEASED}" in cff
-    report = json.loads((tmp_path / "report.json").read_text())
-    assert len(report["outlier_rows"]) == len(found.report.outlier_rows)
+    assert len(report_document(found.report, None, None)["outlier_rows"]) == len(found.report.outlier_rows)
 
 
 @pytest.mark.parametrize(("late_s", "u_s", "said"), [(0.004, 0.003, True), (0.004, 0.001, False), (0.004, 0.0, False)])

@@ -133,7 +133,7 @@ def test_a_play_beside_a_clock_found_from_the_same_motion_is_within_its_uncertai
     corner_s, corner_mm = (0.0, 1.0, 2.871, 4.403, 6.127, 7.127, 8.0), (0.0, 0.0, 0.6559, 0.1048, 0.4936, 0.4936, 0.2)
     fine_s = np.arange(0.0, 8.0, 5e-4)
     moved_mm = play(np.interp(fine_s, corner_s, corner_mm), 0.066, -0.4)
-    frame_s, row_s = np.arange(0.007, 8.0, 0.02), np.arange(0.0, 8.0, 0.02)
+    frame_s, row_s = np.arange(0.007, 8.0, 0.04), np.arange(0.0, 8.0, 0.04)
     gap_mm = 1.2 + 7.72 * np.interp(frame_s, fine_s, moved_mm) + rng.normal(0.0, 5e-4, frame_s.size)
     log, film_s = DriveHistory(row_s, np.interp(row_s, corner_s, corner_mm)), np.round(frame_s + 3.2, 3)
     clock = find_clock_offset(film_s, gap_mm, log)

@@ -179,32 +179,25 @@ def test_curves_that_are_apart_need_no_inset() -> None:
     assert not paper_figure(curves).axes[0].child_axes
 
 
-def test_title_and_names_stand_in_the_figures(rig: Path) -> None:
-    out = rig / "named"
-    words = ("--name", f"{STRAIGHT}=finite elements", "--title", "Gripper 3")
-    done = run("compare", rig / MEASURED, "--model", rig / STRAIGHT, *words, "--out", out)
-    assert done.exit_code == 0, done.output
-    drawn = (out / "compare_gap_against_input.svg").read_text(encoding="utf-8")
-    assert "finite elements, opening" in drawn
-    assert "Gripper 3" in drawn
-    assert "finite elements" in (out / "compare.html").read_text(encoding="utf-8")
-
-
 def test_a_name_of_no_model_is_refused(rig: Path) -> None:
     done = run("compare", rig / MEASURED, "--model", rig / STRAIGHT, "--name", "other.csv=words")
     assert isinstance(done.exception, UsageError)
 
 
-def test_several_models_stand_in_one_table(rig: Path, answer: Path) -> None:
+def test_several_models_stand_in_one_table_and_title_and_names_in_the_figures(rig: Path, answer: Path) -> None:
     out = rig / "both"
     models = [rig / "steep.csv", rig / STRAIGHT, answer / "model.toml"]
     words = [word for model in models for word in ("--model", model)]
+    words += ["--name", "steep.csv=finite elements", "--title", "Gripper 3"]
     done = run("compare", rig / MEASURED, *words, "--out", out, "--json")
     assert done.exit_code == 0, done.output
     found = json.loads(done.output)["models"]
     rms = {one["model"]: one["rms_mm"] for one in found}
-    assert list(rms) == ["steep.csv", STRAIGHT, "model.toml"]
-    assert rms["model.toml"] < rms[STRAIGHT] < rms["steep.csv"]
+    assert list(rms) == ["finite elements", STRAIGHT, "model.toml"]
+    assert rms["model.toml"] < rms[STRAIGHT] < rms["finite elements"]
+    drawn = (out / "compare_gap_against_input.svg").read_text(encoding="utf-8")
+    assert "finite elements, opening" in drawn
+    assert "Gripper 3" in drawn
     page = (out / "compare.html").read_text(encoding="utf-8")
     assert all(escape(name) in page for name in rms)
     check_markup_is_text(page)

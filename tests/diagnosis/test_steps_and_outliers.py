@@ -23,7 +23,11 @@ def diagnosed(folder: Path, gap_of: np.ndarray, input_mm: np.ndarray) -> Diagnos
 
 
 @pytest.mark.parametrize(
-    ("levels_mm", "names"), [(LEVELS_MM, ("drive_lag",)), (UNEVEN_MM, ("drive_lag", "slew_limit"))]
+    ("levels_mm", "names"),
+    [
+        (LEVELS_MM, ("drive_lag",)),
+        pytest.param(UNEVEN_MM, ("drive_lag", "slew_limit"), marks=pytest.mark.slow),
+    ],
 )
 def test_two_late_samples_after_each_step_are_a_finding(
     tmp_path: Path, levels_mm: tuple[float, ...], names: tuple[str, ...]

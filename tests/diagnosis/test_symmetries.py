@@ -5,8 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.report import DiagnosisReport
@@ -61,21 +59,11 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> DiagnosisReport:
     return asked(tmp_path_factory.mktemp("plain"), rows(mirror=False))
 
 
-@settings(max_examples=3)
-@given(
-    order=st.permutations(range(180)),
-    columns=st.permutations(COLUMNS),
-    names=st.lists(st.sampled_from(("a", "zz", "run 7", "0", "Lauf")), min_size=2, max_size=2, unique=True),
-)
-def test_order_and_names_change_nothing(
-    plain: DiagnosisReport,
-    tmp_path_factory: pytest.TempPathFactory,
-    order: list[int],
-    columns: list[str],
-    names: list[str],
-) -> None:
-    table = [(names[int(row[0])], *row[1:]) for row in rows(mirror=False)]
-    report = asked(tmp_path_factory.mktemp("other"), [table[k] for k in order], tuple(columns))
+def test_order_and_names_change_nothing(plain: DiagnosisReport, tmp_path: Path) -> None:
+    rng = np.random.default_rng(SEED)
+    # The names come in the other order than the runs.
+    table = [(("run 7", "0")[int(row[0])], *row[1:]) for row in rows(mirror=False)]
+    report = asked(tmp_path, [table[k] for k in rng.permutation(180)], tuple(rng.permutation(COLUMNS).tolist()))
     assert told(report) == told(plain)
 
 

@@ -137,12 +137,12 @@ def test_far_jumps_into_deep_contact_are_followed(gripper: Gripper) -> None:
     """
     inputs = np.array([-1.0, -0.52, 0.5])
     model = LumpedGripper(gripper, Physics(large_rotation=True, contact=True))
-    small = model.respond(np.linspace(-1.0, 0.5, 151))
+    small = model.respond(np.linspace(-1.0, 0.5, 76))
     assert small.force_n is not None
     found = LumpedGripper(gripper, model.physics).equilibria(inputs.tolist())
-    forces = np.interp(inputs, np.linspace(-1.0, 0.5, 151), small.force_n)
+    forces = np.interp(inputs, np.linspace(-1.0, 0.5, 76), small.force_n)
     assert [state.force_n for state in found] == pytest.approx(forces.tolist(), rel=2e-3)
     gaps = model.elastic.driven.gaps[0]
     assert min(gaps(state.displacement)[0].min() for state in found) > -1e-6
-    for nodes in (3, 5, 9, 17, 40):
+    for nodes in (3, 5, 17):
         assert model.body_poses(np.linspace(-1.0, 0.5, nodes))

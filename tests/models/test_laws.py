@@ -92,7 +92,7 @@ def test_zero_parameters_change_nothing(drawn: PhysicalGripper, name: str) -> No
     agree(obeying(drawn, {name: zero}), drawn.respond(INPUT), ROUNDING_MM, ROUNDING_MM)
 
 
-@pytest.mark.parametrize("by", [-0.1, -0.01, 0.01, 0.1])
+@pytest.mark.parametrize("by", [-0.1, 0.1])
 def test_a_longer_lever_is_its_ratio_in_gap_and_force(drawn: PhysicalGripper, gripper: Gripper, by: float) -> None:
     changed = LumpedGripper(longer_lever(gripper, by)).respond(INPUT)
     ratio = float((changed.gap_mm[-1] - 4.0) / (drawn.respond(INPUT).gap_mm[-1] - 4.0)) - 1.0

@@ -146,7 +146,7 @@ def test_equation_4_describes_the_lowest_modes_alone(lumped: LumpedGripper) -> N
 
 def test_time_steps_and_modes_agree(gripper: Gripper) -> None:
     """Without contact during the motion, modes and time steps describe the same linear body."""
-    drive = steps((0.0, 0.0), (0.005, 0.2), (0.02, 0.2), rows=200)
+    drive = steps((0.0, 0.0), (0.005, 0.2), (0.01, 0.2), rows=100)
     modal = gripper_motion(LumpedGripper(gripper), drive)
     stepped = gripper_motion(LumpedGripper(gripper, Physics(contact=True)), drive)
     assert "steps" in stepped.method

@@ -54,7 +54,7 @@ def found(one):
     return find_clock_offset(one.time_s, one.gap_mm, one.drive)
 
 
-@pytest.mark.parametrize(("offset_s", "rate", "play_mm"), [(-41.37, 0.0, 0.05), (23.0, 1e-3, 0.0), (0.0, -5e-4, 0.1)])
+@pytest.mark.parametrize(("offset_s", "rate", "play_mm"), [(23.0, 1e-3, 0.0), (-41.37, -5e-4, 0.1)])
 def test_offset_rate_and_play_are_found_within_their_uncertainty(offset_s, rate, play_mm):
     clock = found(drawn(offset_s, rate, play_mm))
     assert isinstance(clock, ClockOffset)
@@ -63,6 +63,7 @@ def test_offset_rate_and_play_are_found_within_their_uncertainty(offset_s, rate,
     assert abs(clock.rate - rate) < SIGMAS * clock.u_rate
     assert abs(clock.play_mm - play_mm) < SIGMAS * clock.u_play_mm + 1e-4
     assert any("runs fast" in note for note in clock.notes) == (rate == 1e-3)
+    assert clock.runner_up_s is None
     # Both ways of reading the clock are each other's inverse.
     assert clock.log_time_s(float(clock.recording_time_s(np.array([7.0]))[0])) == pytest.approx(7.0, abs=1e-9)
 
@@ -130,7 +131,6 @@ def test_the_next_best_offset_is_named_where_there_is_one():
     assert clock.offset_s == pytest.approx(2.0, abs=0.02)
     assert abs(clock.runner_up_s - clock.offset_s) == pytest.approx(5.0, abs=0.2)
     assert any(f"{clock.runner_up_s:.3f} s" in note for note in clock.notes)
-    assert found(drawn(2.0)).runner_up_s is None
 
 
 def test_a_log_of_set_points_is_refused():
