@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from fingervision.diagnosis.bodies.body_prediction import BodyPrediction
 from fingervision.diagnosis.bodies.channel_noise import ChannelNoise, channel_noise
@@ -408,7 +408,7 @@ class HealthyReference:
         beside = RandomEffects(nuisances)
         left = beside.beside(self._measured)
         first = [self._fit(change, beside, left) for change in self._candidates]
-        limit = float(chi2.isf(FALSE_CLAIM / len(first), 1))
+        limit = float(chdtri(1, FALSE_CLAIM / len(first)))
         best = max(first, key=lambda one: one.gain)
         # What no candidate explains widens all uncertainties.
         degrees = max(self._degrees(nuisances), 1)
@@ -420,7 +420,7 @@ class HealthyReference:
             by_place[one.change.place] = max(by_place.get(one.change.place, 0.0), one.gain / limit / excess)
         # A shape of any kind in any channel or outline is a change, whether or not a candidate explains it.
         if best.gain < limit * excess:
-            shaped = float(left @ left) > float(chi2.isf(FALSE_CLAIM, degrees)) * _noise_of_noise(self, degrees)
+            shaped = float(left @ left) > float(chdtri(degrees, FALSE_CLAIM)) * _noise_of_noise(self, degrees)
             return WhatChanged(shaped, (), by_place, smallest, np.inf)
         wider = RandomEffects([*nuisances, *self._form_errors(best)])
         left = wider.beside(self._measured)
@@ -428,7 +428,7 @@ class HealthyReference:
         top = second[0]
         rest = float(left @ left) - top.gain
         excess = max(1.0, rest / degrees)
-        if rest - degrees > max(STRUCTURE_SHARE * top.gain, float(chi2.isf(FALSE_CLAIM, degrees)) - degrees):
+        if rest - degrees > max(STRUCTURE_SHARE * top.gain, float(chdtri(degrees, FALSE_CLAIM)) - degrees):
             return WhatChanged(True, (), by_place, smallest, np.inf)
         members = tuple(one for one in second if top.gain - one.gain < ALIKE * excess)
         behind = min((top.gain - one.gain for one in members if one.change.place != top.change.place), default=np.inf)

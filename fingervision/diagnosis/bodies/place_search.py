@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from fingervision.diagnosis.bodies.body_prediction import BodyPrediction
 from fingervision.diagnosis.bodies.channel_noise import channel_noise
@@ -153,7 +153,7 @@ class PlaceSearch:
         basis, values, _ = np.linalg.svd(np.array(probes).T, full_matrices=False)
         basis = basis[:, values > 1e-6 * values.max()]
         total = float(np.sum((basis.T @ left) ** 2))
-        return total if total > float(chi2.isf(STRUCTURE, basis.shape[1])) else 0.0
+        return total if total > float(chdtri(basis.shape[1], STRUCTURE)) else 0.0
 
     def run(self, rng: np.random.Generator) -> PlaceFindings:
         """Run the search for a faulty place."""

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtr, bdtrc
 
 from fingervision.diagnosis.inference.evidence import STRONG, choices
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
@@ -196,11 +196,11 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
     if data.chain.history.time_s is not None and any(_in_stretches(values) for values in both):
         return None
     count = residual_mm.size
-    if between < SHARES[0] and binom.cdf(round(between * count), count, NORMAL_SHARE) < BY_CHANCE:
+    if between < SHARES[0] and bdtr(round(between * count), count, NORMAL_SHARE) < BY_CHANCE:
         above = residual_mm > np.mean(residual_mm)
         apart_mm = float(np.mean(residual_mm[above]) - np.mean(residual_mm[~above]))
         words = f"the residual consists of two groups about {apart_mm:.2g} mm apart"
-    elif together > SHARES[1] and binom.sf(round(together * count) - 1, count, NORMAL_SHARE) < BY_CHANCE:
+    elif together > SHARES[1] and bdtrc(round(together * count) - 1, count, NORMAL_SHARE) < BY_CHANCE:
         words = (
             f"{100.0 * together:.0f} % of the rows agree, and the remaining rows differ from them by {sigma:.2g} mm or "
             "more"

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from fingervision.diagnosis.inference.hypothesis import START_VARIANCE, Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
@@ -24,6 +23,7 @@ from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
 from fingervision.motion.input_path import recorded
 from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
+from fingervision.motion.recursion import recursion
 
 FEWEST_POWERS = 20
 """Least number of values of the periodogram: the variance of white noise is then known to a third."""
@@ -243,9 +243,10 @@ def _assumed(problem: Problem, rng: np.random.Generator) -> list[Array]:
 
 def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
     """First-order autoregression of unit variance; shape (count,)."""
-    start = phi * rng.standard_normal(1)
+    start = phi * float(rng.standard_normal())
     shocks = np.sqrt(1.0 - phi**2) * rng.standard_normal(count)
-    return np.asarray(lfilter([1.0], [1.0, -phi], shocks, zi=start)[0], dtype=np.float64)
+    shocks[0] += start
+    return recursion(phi, shocks)
 
 
 def simulated_errors(data: Observations, rng: np.random.Generator) -> Iterator[Array]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from fingervision.diagnosis.inference.held_out_prediction import rms_mm
 from fingervision.diagnosis.inference.hypothesis import Problem
@@ -113,7 +113,7 @@ class Standing:
         ratio = (self.after_mm / max(self.noise_mm, 1e-300)) ** 2
         if self.noise_degrees is None:
             return ratio <= STANDING_NOISES**2
-        return float(fisher.sf(ratio, self.rows, self.noise_degrees)) > LACK_OF_FIT
+        return float(fdtrc(self.rows, self.noise_degrees, ratio)) > LACK_OF_FIT
 
 
 def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:

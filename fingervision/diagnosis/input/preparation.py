@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import theilslopes
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.inference.signatures import start_patterns
@@ -53,7 +52,9 @@ def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tup
         )
     if isinstance(model, TableModel) and model.input_mm.size >= 8:
         gap = model.right_mm - model.left_mm
-        slope = theilslopes(gap, model.input_mm)[0]
+        # The median slope of all pairs of rows (Theil and Sen), which single faulty rows do not move.
+        first, second = np.triu_indices(gap.size, 1)
+        slope = np.median((gap[second] - gap[first]) / (model.input_mm[second] - model.input_mm[first]))
         intercept = np.median(gap - slope * model.input_mm)
         off = np.abs(gap - intercept - slope * model.input_mm)
         faulty = off > OFF_LINE * np.ptp(gap)

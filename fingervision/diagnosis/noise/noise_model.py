@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import hypergeom
+from scipy.special import betaln
 
 from fingervision.domain.effect import Array, Flags
 
@@ -94,11 +94,22 @@ def gate(
 def _recurring(out: Flags, parts: list[NDArray[np.intp]]) -> Flags:
     """Mark parts of the range with more deviating samples than gross errors would cause, which occur anywhere."""
     there = np.zeros(out.size, dtype=bool)
-    counts, sizes = np.array([[out[part].sum(), part.size] for part in parts]).T
-    by_chance = hypergeom.sf(counts - 1, out.size, int(out.sum()), sizes)
-    for number in np.flatnonzero(by_chance < BY_CHANCE / len(parts)):
-        there[parts[number]] = True
+    for part in parts:
+        there[part] |= _at_least(int(out[part].sum()), part.size, int(out.sum()), out.size) < BY_CHANCE / len(parts)
     return there
+
+
+def _at_least(seen: int, drawn: int, marked: int, total: int) -> float:
+    """Probability of at least `seen` marked ones among `drawn` of `total` (hypergeometric distribution)."""
+    hits = np.arange(max(seen, drawn + marked - total), min(drawn, marked) + 1)
+    chances = (
+        _log_choose(marked, hits) + _log_choose(total - marked, drawn - hits) - _log_choose(total, np.array(drawn))
+    )
+    return float(np.exp(chances).sum())
+
+
+def _log_choose(total: int, taken: NDArray[np.intp]) -> Array:
+    return np.asarray(-np.log1p(total) - betaln(total - taken + 1.0, taken + 1.0), dtype=np.float64)
 
 
 def _places(input_mm: Array) -> list[NDArray[np.intp]]:

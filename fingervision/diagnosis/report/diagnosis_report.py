@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.special import bdtrc
 
 from fingervision.diagnosis.design.next_look import further_evidence, next_look
 from fingervision.diagnosis.design.next_run import next_run
@@ -193,7 +193,7 @@ def band_words(history: History, gap_of_input_mm: Array, residual_mm: Array) -> 
         words.append(f"{idle.size} steps of up to {idle.max():.2g} mm had no response, but all larger steps had")
     away = (rests - rests.mean())[followed] * np.sign(steps[followed])
     short = int(np.sum(away < 0.0))
-    chance = binomtest(short, away.size, 0.5, alternative="greater").pvalue if away.size else 1.0
+    chance = float(bdtrc(short - 1, away.size, 0.5)) if away.size else 1.0
     band = float(np.median(-away[away < 0.0])) if short else 0.0
     still = AT_REST * float(np.median(np.abs(creeps[followed]))) if away.size else 0.0
     if chance < BY_CHANCE and short >= SHORT_SHARE * away.size and band > still:

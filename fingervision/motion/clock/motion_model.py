@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 from fingervision.effects.play_operator import play
 from fingervision.motion.log_path import LogPath
+from fingervision.motion.recursion import recursion
 
 CREEP_S = (0.5, 5.0)
 """Time constants of creep (s), a decade apart: faster creep acts as a delay and becomes part of the offset; slower
@@ -160,7 +160,7 @@ class Motion:
         share = 1.0 - float(np.exp(-step_s / tau_s))
         # Between grid points the path is a straight line, so that its mean is used for each step.
         middle = np.append(past[:1], 0.5 * (past[1:] + past[:-1]))
-        mean = lfilter([share], [1.0, share - 1.0], middle - past[0]) + past[0]
+        mean = recursion(1.0 - share, share * (middle - past[0])) + past[0]
         return np.asarray(np.interp(self.log_time_s(at), grid_s, mean))
 
     def whitened(self, columns: Array) -> Array:
