@@ -228,10 +228,10 @@ class Batch:
     >>> import tempfile
     >>> import fingervision as fv
     >>> done = fv.batch.measure(
-    ...     "sample_frames/table1/frame_0[01].png", out=tempfile.mkdtemp() + "/all", px_per_mm=34.0, jobs=1
+    ...     "sample_frames/table1/frame_00.png", out=tempfile.mkdtemp() + "/all", px_per_mm=34.0, jobs=1
     ... )
     >>> len(done.outcomes), done.fresh, done.bad
-    (2, 2, ())
+    (1, 1, ())
     """
 
     out: Path

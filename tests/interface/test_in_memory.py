@@ -42,15 +42,16 @@ def test_a_generator_of_any_length_needs_the_memory_of_a_few_pictures() -> None:
     learnt, held = 60, []  # the camera is learnt from pictures before this one, and they are let go
 
     def watched() -> Iterator[np.ndarray]:
-        for index, picture in enumerate(pictures(learnt + 100)):
+        for index, picture in enumerate(pictures(learnt + 40)):
+            if index == learnt:
+                tracemalloc.start()
             if index >= learnt:
                 held.append(tracemalloc.get_traced_memory()[0])
             yield picture
 
-    tracemalloc.start()
     fv.measure(watched(), px_per_mm=34.0)
     tracemalloc.stop()
-    # A hundred pictures more would take a hundred times their size; their rows take a few kilobytes each.
+    # Forty pictures more would take forty times their size; their rows take a few kilobytes each.
     assert max(held) - held[0] < 12 * SIZE[0] * SIZE[1]
 
 

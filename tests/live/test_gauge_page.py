@@ -54,8 +54,9 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder.mkdir()
     rng = np.random.default_rng(5)
     for number in range(FRAMES):
-        light = drawn(SHAPE, 60, [(half_plane(80 + 2.5 * number, 96, 0.0), 160), (bar(180, 96, 0.0, 30), 60)])
-        cv2.imwrite(str(folder / f"{number:03d}.png"), seen(light, 1.0, rng))
+        # All rows are alike.
+        light = drawn((1, SHAPE[1]), 60, [(half_plane(80 + 2.5 * number, 0, 0.0), 160), (bar(180, 0, 0.0, 30), 60)])
+        cv2.imwrite(str(folder / f"{number:03d}.png"), seen(light.repeat(SHAPE[0], axis=0), 1.0, rng))
     return folder
 
 

@@ -33,9 +33,9 @@ def frames() -> list[Frame]:
     rng = np.random.default_rng(5)
     found = []
     for number in range(8):
-        light = drawn((HEIGHT, WIDTH), 60, [(half_plane(200 + PER_FRAME * number, 240, 0.0), 160),
-                                            (bar(400, 240, 0.0, 30), 60)])  # fmt: skip
-        found.append(Frame(seen(light, 1.0, rng), number, 0.04 * number))
+        # All rows are alike.
+        light = drawn((1, WIDTH), 60, [(half_plane(200 + PER_FRAME * number, 0, 0.0), 160), (bar(400, 0, 0.0, 30), 60)])
+        found.append(Frame(seen(light.repeat(HEIGHT, axis=0), 1.0, rng), number, 0.04 * number))
     return found
 
 

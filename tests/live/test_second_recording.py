@@ -22,8 +22,8 @@ from tests.live.conftest import serving
 from tests.waiting import until
 
 __all__ = ["browser", "opened"]
-FRAMES, RATE_HZ, PX_PER_MM = 60, 25.0, 34.0
-WIDER_PX, FAULT_PX, FAULTY = 1.7, 3.0, range(40, 46)
+FRAMES, RATE_HZ, PX_PER_MM = 36, 25.0, 34.0
+WIDER_PX, FAULT_PX, FAULTY = 1.7, 3.0, range(26, 32)
 # The second recording began so much later: between two of its frames there is one of the first.
 LATER_S = 0.5 / RATE_HZ
 
@@ -84,7 +84,7 @@ def test_difference_is_that_of_the_drawn_fingers(views: tuple[Playback, SecondRe
     assert len(errors) > 0.7 * FRAMES
     assert max(map(abs, errors)) < 4.0
     inside = dict(zip([row.frame for row, _ in known], [row.gap_mm - each[0] for row, each in known], strict=True))
-    assert inside[43] * PX_PER_MM == pytest.approx(-WIDER_PX - FAULT_PX, abs=0.6)
+    assert inside[29] * PX_PER_MM == pytest.approx(-WIDER_PX - FAULT_PX, abs=0.6)
 
 
 def test_second_recording_follows_the_first_and_its_settings(views: tuple[Playback, SecondRecording]) -> None:
@@ -120,8 +120,8 @@ def test_page_shows_both_recordings_and_where_they_differ_most(
         shown(page, "!document.querySelector('#residual_chart').hidden")
         page.wait_for_timeout(500)
         page.keyboard.press("w")
-        shown(page, "Number(document.querySelector('#gap_mm').dataset.frame) >= 40")
-        shown(page, "Number(document.querySelector('#gap_mm').dataset.frame) <= 46")
+        shown(page, "Number(document.querySelector('#gap_mm').dataset.frame) >= 26")
+        shown(page, "Number(document.querySelector('#gap_mm').dataset.frame) <= 32")
         shown(page, "document.querySelector('#readout').textContent.includes('difference')")
         page.fill("#second_offset", "nonsense")
         page.press("#second_offset", "Enter")

@@ -12,6 +12,9 @@ from operator import itemgetter
 from time import monotonic, sleep
 from typing import Any, ClassVar
 
+import pytest
+import serial
+
 from fingervision.testbed.clocks.clock import VirtualClock
 
 
@@ -105,7 +108,7 @@ class Emulator:
         self._turn = threading.Lock()
         self.nonsense = self.silent = False
         self._listener: socket.socket | None = None
-        self._client: socket.socket | None = None
+        self._client: socket.socket | Wire | None = None
         self._number = 0
         self.plug()
 
@@ -118,6 +121,11 @@ class Emulator:
         self._number = self._listener.getsockname()[1]
         threading.Thread(target=self._serve, args=(self._listener,), daemon=True).start()
         self.plugged.add(self)
+
+    def wired(self, wire: "Wire") -> threading.Lock:
+        """Talk over a wire from now on; only one thread at a time does."""
+        self._client = wire
+        return self._turn
 
     def unplug(self) -> None:
         self.plugged.discard(self)
@@ -132,11 +140,11 @@ class Emulator:
     def _serve(self, listener: socket.socket) -> None:
         while True:
             try:
-                self._client, _ = listener.accept()
-                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._client, _ = (client, _) = listener.accept()
+                client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             except OSError:
                 return
-            threading.Thread(target=self._talk, args=(self._client,), daemon=True).start()
+            threading.Thread(target=self._talk, args=(client,), daemon=True).start()
 
     def _talk(self, client: socket.socket) -> None:
         rest = b""
@@ -146,18 +154,19 @@ class Emulator:
                     if not (data := client.recv(4096)):
                         self._client = None if self._client is client else self._client
                         return
-                    rest = self._take(rest + data, client)
+                    rest = self.take(rest + data, client)
 
     def settle(self) -> None:
         """Wait until everything that was sent to this controller has been heard and answered."""
         with suppress(OSError, ValueError):
-            while True:
+            while not isinstance(self._client, Wire):
                 with self._turn:
                     if self._client is None or not select.select([self._client], [], [], 0.0)[0]:
                         return
                 sleep(1e-4)
 
-    def _take(self, data: bytes, client: socket.socket) -> bytes:
+    def take(self, data: bytes, client: "socket.socket | Wire") -> bytes:
+        """Hear bytes, answer the whole messages among them, and return the rest."""
         line = b""
         for k in range(len(data)):
             byte = data[k : k + 1]
@@ -170,7 +179,7 @@ class Emulator:
                 line += byte
         return line
 
-    def _reply(self, client: socket.socket, line: str) -> None:
+    def _reply(self, client: "socket.socket | Wire", line: str) -> None:
         self.heard.append(line)
         for said in self.answer(line):
             if self.silent:
@@ -188,6 +197,68 @@ class Emulator:
             threading.Timer(seconds, act).start()
         else:
             Time.due.append((Time.now_s() + seconds, act))
+
+
+class Wire:
+    """The port of a plugged emulator without a socket: answers are there at once, and waiting in vain takes no time."""
+
+    waited_s = 0.0
+
+    def __init__(self, port: str, timeout: float = 0.0, **settings: object) -> None:
+        found = next((each for each in Emulator.plugged if each.port == port), None)
+        if found is None:
+            raise serial.SerialException(f"nothing is connected to {port}")
+        self.port, self.timeout = port, timeout
+        self._device, self._half, self._answers, self._cut = found, b"", bytearray(), False
+        self._turn = found.wired(self)
+
+    @classmethod
+    def now_s(cls) -> float:
+        return cls.waited_s
+
+    def write(self, data: bytes) -> None:
+        with self._turn:
+            if self._cut:
+                raise serial.SerialException("the wire is cut")
+            self._half = self._device.take(self._half + data, self)
+
+    def sendall(self, data: bytes) -> None:
+        self._answers += data
+
+    @property
+    def in_waiting(self) -> int:
+        return len(self._answers)
+
+    def read(self, size: int) -> bytes:
+        with self._turn:
+            if self._cut:
+                raise serial.SerialException("the wire is cut")
+            got = bytes(self._answers[:size])
+            del self._answers[:size]
+        if not got:
+            Wire.waited_s += self.timeout
+        return got
+
+    def reset_input_buffer(self) -> None:
+        self._answers.clear()
+
+    def close(self) -> None:
+        self._cut = True
+
+    def shutdown(self, how: int) -> None:
+        """Let the emulator cut it."""
+
+
+def virtual_time(monkeypatch: pytest.MonkeyPatch, clock: EmulatorsClock | None = None, wires: bool = True) -> None:
+    """Let the next test beds and the emulators share a virtual clock, and wires, from now on."""
+    clock = clock or EmulatorsClock(begin_s=monotonic())
+    monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: clock)
+    monkeypatch.setattr(Time, "now_s", clock.now_s)
+    monkeypatch.setattr(Time, "due", [])
+    if wires:
+        monkeypatch.setattr(serial, "serial_for_url", Wire)
+        for each in ("text_protocol.line", "actuators.kinesis"):
+            monkeypatch.setattr(f"fingervision.testbed.{each}.monotonic", Wire.now_s)
 
 
 class Grbl(Emulator):
@@ -507,7 +578,7 @@ class Kinesis(Emulator):
         super().__init__()
         self.plant.homed = True
 
-    def _take(self, data: bytes, client: socket.socket) -> bytes:
+    def take(self, data: bytes, client: "socket.socket | Wire") -> bytes:
         while len(data) >= 6:
             message, first, second, to = struct.unpack_from("<HBBB", data)
             size = 6 + (first + 256 * second if to & 0x80 else 0)

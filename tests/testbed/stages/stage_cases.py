@@ -31,7 +31,7 @@ GRIPPER = "input_mm,gap_mm\n-2,0.5\n8,5.5\n"
 class Case:
     """A kind of stage; the emulator has `plant`, `port`, `plug`, `unplug`, `close`, and maybe `nonsense`, `silent`.
 
-    `virtual`: it follows the clock of the test bed; otherwise it moves in real time.
+    `virtual`: it follows the clock of the test bed; otherwise it moves in real time. `wired`: instead of a socket.
     """
 
     make: Callable[[], Any]
@@ -40,6 +40,7 @@ class Case:
     settling_s: float = 0.2
     virtual: bool = True
     speed_mm_s: float = 5.0
+    wired: bool = True
 
     def bed_at(self, folder: Path, emulator: Any, camera: str = "") -> Path:
         path = folder / "bed.toml"
@@ -116,7 +117,8 @@ CASES: dict[str, Case] = {
     "pi_gcs": Case(emulators.PiGcs, text("pi_gcs")),
     "smaract_mcs": Case(emulators.SmarAct, text("smaract_mcs")),
     "newport_esp": Case(emulators.NewportEsp, text("newport_esp")),
-    "esp300": Case(emulators.NewportEsp, 'kind = "esp300"\nport = "PORT"\naxis = 1\n'),
+    # The same words, over a socket.
+    "esp300": Case(emulators.NewportEsp, 'kind = "esp300"\nport = "PORT"\naxis = 1\n', wired=False),
     "zaber": Case(emulators.Zaber, 'kind = "zaber"\nport = "PORT"\nmicrostep_mm = 0.0001\n'),
     "kinesis": Case(
         emulators.Kinesis,

@@ -13,7 +13,7 @@ from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.run.controls import Controls
 from fingervision.testbed.run.recipe_run import run_recipe
 from tests.testbed.simulated_beds import recipe_at, steps
-from tests.testbed.stages.emulators import EmulatorsClock, Grbl, Plant, Time
+from tests.testbed.stages.emulators import EmulatorsClock, Grbl, Plant, virtual_time
 from tests.testbed.stages.stage_cases import CAMERA, CASES
 
 pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
@@ -39,10 +39,8 @@ class InterruptingClock(EmulatorsClock):
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> InterruptingClock:
     clock = InterruptingClock(begin_s=100.0)
-    monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: clock)
     monkeypatch.setattr("fingervision.testbed.text_protocol.line.sleep", lambda seconds: None)
-    monkeypatch.setattr(Time, "now_s", clock.now_s)
-    monkeypatch.setattr(Time, "due", [])
+    virtual_time(monkeypatch, clock)
     return clock
 
 
@@ -88,8 +86,7 @@ def test_rows_are_where_the_stage_was_also_where_it_starts_and_arrives(
     assert_true(read_samples(tmp_path / "run" / "samples.csv"), device.plant)
 
 
-@pytest.mark.parametrize("frames", [0.3, 0.9])
-@pytest.mark.parametrize("step_mm", [0.0, 0.005])
+@pytest.mark.parametrize(("frames", "step_mm"), [(0.3, 0.0), (0.9, 0.005)])
 def test_the_last_rows_before_an_interruption_are_where_the_stage_was(
     frames: float, step_mm: float, clock: InterruptingClock, device: Grbl, tmp_path: Path
 ) -> None:

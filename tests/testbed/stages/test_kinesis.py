@@ -16,7 +16,7 @@ STATUS = bytes.fromhex("290401005001")
 TO = {"dest": 0x50, "source": 0x01, "chan_ident": 1}
 
 
-def test_what_is_sent_is_what_the_library_would_send(tmp_path: Path) -> None:
+def test_what_is_sent_is_what_the_library_would_send(virtual: None, tmp_path: Path) -> None:
     device = Kinesis()
     stage = open_bed(str(CASES["kinesis"].bed_at(tmp_path, device))).actuator
     device.heard.clear()
@@ -51,7 +51,7 @@ def test_what_the_emulator_answers_is_what_the_library_reads() -> None:
     device.close()
 
 
-def test_an_excessive_position_error_is_an_alarm(tmp_path: Path) -> None:
+def test_an_excessive_position_error_is_an_alarm(virtual: None, tmp_path: Path) -> None:
     device = Kinesis()
     stage = open_bed(str(CASES["kinesis"].bed_at(tmp_path, device))).actuator
     stage.move(1.0, 1.0)

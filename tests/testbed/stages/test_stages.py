@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,7 +24,7 @@ from fingervision.testbed.device_kinds import kinds
 from fingervision.testbed.manual import manual_control
 from fingervision.testing import ActuatorContract, checks_of
 from fingervision.testing import run as failures
-from tests.testbed.stages.emulators import EmulatorsClock, Time
+from tests.testbed.stages.emulators import virtual_time
 from tests.testbed.stages.recipe_process import run, started
 from tests.testbed.stages.stage_cases import CAMERA, CASES, Case
 
@@ -31,7 +32,7 @@ from tests.testbed.stages.stage_cases import CAMERA, CASES, Case
 pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
 # The computer may be loaded by other tests.
 PATIENCE_S = 240.0
-# Two rows a motion and more at each point: 33 and more frames, and 330 and more.
+# Two rows a motion and more at each point: 15 and more frames, and 330 and more.
 RECIPE = """
 schema = 1
 [[step]]
@@ -48,15 +49,7 @@ dwell_s = 0.0
 speed_mm_s = 0.5
 frames = {frames}
 """
-FEW, MANY = RECIPE.format(steps=2, frames=10), RECIPE.format(steps=9, frames=33)
-
-
-def virtual_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the next test beds and the emulators share a virtual clock, from now on."""
-    clock = EmulatorsClock(begin_s=time.monotonic())
-    monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: clock)
-    monkeypatch.setattr(Time, "now_s", clock.now_s)
-    monkeypatch.setattr(Time, "due", [])
+FEW, MANY = RECIPE.format(steps=2, frames=4), RECIPE.format(steps=9, frames=33)
 
 
 @pytest.fixture(params=[pytest.param(name, marks=() if CASES[name].virtual else pytest.mark.slow) for name in CASES])
@@ -67,6 +60,8 @@ def case(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Cas
     monkeypatch.setenv("OPHYD_CONTROL_LAYER", "caproto")
     # The emulators are ready at once, unlike a board that restarts when its port is opened.
     monkeypatch.setattr("fingervision.testbed.text_protocol.line.sleep", lambda seconds: None)
+    # pyserial's socket sleeps when it is closed.
+    monkeypatch.setattr("serial.urlhandler.protocol_socket.time", SimpleNamespace(sleep=lambda seconds: None))
     return found
 
 
@@ -80,7 +75,7 @@ def device(case: Case) -> Iterator[Any]:
 @pytest.fixture
 def virtual(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     if case.virtual:
-        virtual_time(monkeypatch)
+        virtual_time(monkeypatch, wires=case.wired)
 
 
 @pytest.fixture
@@ -171,8 +166,8 @@ def test_an_unplugged_stage_is_a_sentence_and_works_when_it_is_back(
 def test_nonsense_and_silence_are_sentences_and_leave_the_stage_at_rest(
     case: Case, device: Any, bed: Bed, fault: str, tmp_path: Path
 ) -> None:
-    if not hasattr(device, fault):
-        pytest.skip("what is emulated is not ours, and has no such fault")
+    if not hasattr(device, fault) or not case.wired:
+        pytest.skip("what is emulated is not ours and has no such fault, or would be waited for")
     bed.actuator.move(2.0, 1.0)
     wait(bed, 0.1)
     setattr(device, fault, True)
@@ -210,9 +205,9 @@ def test_a_recipe_loses_nothing_when_the_cable_is_pulled(
 ) -> None:
     has_a_cable(device)
     (tmp_path / "recipe.toml").write_text(FEW, encoding="utf-8")
-    path, out = case.bed_at(tmp_path, device, CAMERA), tmp_path / "run"
-    unplugged_and_back(device, path, out, after=12)
-    assert_complete(out, at_least=33)
+    path, out = case.bed_at(tmp_path, device, CAMERA.replace("rate_hz = 100", "rate_hz = 25")), tmp_path / "run"
+    unplugged_and_back(device, path, out, after=8)
+    assert_complete(out, at_least=15)
 
 
 @pytest.mark.slow
@@ -230,7 +225,7 @@ def test_three_hundred_frames_through_kill_9_and_a_pulled_cable(
     rows = len(read_samples(out / "samples.csv"))
     assert in_video - rows <= 100  # a second
     if case.virtual:
-        virtual_time(monkeypatch)
+        virtual_time(monkeypatch, wires=False)
     if hasattr(device, "unplug"):
         resumed_after = unplugged_and_back(device, path, out, after=100)
         assert resumed_after >= 100

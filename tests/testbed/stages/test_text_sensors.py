@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,11 +18,13 @@ from fingervision.tables.read import read_measured_table
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.run.recipe_run import run_recipe
+from fingervision.testbed.text_protocol import line
 from fingervision.testing import ForceSensorContract, run
 from tests.testbed.stages.emulators import Emulator, Meter, PrintedNumbers
 from tests.testbed.stages.stage_cases import CAMERA, GRIPPER
 
 pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
+FILES = Path(line.__file__).with_name("files")
 RECIPE = 'schema = 1\n[[step]]\nkind = "hold"\nat_mm = 0.0\nseconds = 0.6\n'
 SIM = """
 spec: "1.1"
@@ -39,6 +42,8 @@ resources:
 @pytest.fixture
 def bed_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Bed]:
     monkeypatch.setattr("fingervision.testbed.text_protocol.line.sleep", lambda seconds: None)
+    # pyserial's socket sleeps when it is closed.
+    monkeypatch.setattr("serial.urlhandler.protocol_socket.time", SimpleNamespace(sleep=lambda seconds: None))
 
     def opened(lines: str) -> Bed:
         path = tmp_path / "bed.toml"
@@ -69,8 +74,21 @@ def test_a_force_sensor_keeps_the_contract(
     bed = bed_of(force(words, device.port, more))
     assert bed.force_sensor is not None
     assert bed.force_sensor.readings()[-1].value == pytest.approx(expected_n)
-    for fault in ("nonsense", "silent"):
-        setattr(device, fault, True)
+    bed.close()
+    device.close()
+
+
+@pytest.mark.parametrize("fault", ["nonsense", "silent"])
+@pytest.mark.parametrize(("make", "words"), [(Meter, "scpi"), (PrintedNumbers, "printed_numbers")])
+def test_a_force_sensor_that_fails_is_said(
+    make: Callable[[], Emulator], words: str, fault: str, tmp_path: Path, bed_of: Callable[[str], Bed]
+) -> None:
+    text = (FILES / f"{words}.toml").read_text(encoding="utf-8").replace("answer_s = 2.0", "answer_s = 0.2")
+    (tmp_path / "hasty.toml").write_text(text, encoding="utf-8")
+    device = make()
+    bed = bed_of(force("./hasty.toml", device.port, "patience_s = 0.3\n"))
+    assert bed.force_sensor is not None
+    setattr(device, fault, True)
     with pytest.raises(DeviceError, match="must send values while the test bed works"):
         [bed.force_sensor.readings() for _ in range(100)]
     bed.close()

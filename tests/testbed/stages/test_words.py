@@ -16,7 +16,7 @@ from fingervision.testbed.text_protocol.words import known_words
 from tests.testbed.stages.emulators import Conex, Emulator, Invented, Zaber
 from tests.testbed.stages.stage_cases import CASES, Case, text
 
-pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <socket:pytest.PytestUnraisableExceptionWarning")
+pytestmark = pytest.mark.usefixtures("virtual")
 PAGE = (Path(__file__).parents[3] / "docs" / "how_to" / "stages.md").read_text(encoding="utf-8")
 EXAMPLE = re.search(r"```toml\n( *# my_stage\.toml\n.*?)```", PAGE, re.DOTALL)[1].replace("\n   ", "\n")  # type: ignore[index]
 # What a reader of the page wrote for a controller that no file of the package knows.
