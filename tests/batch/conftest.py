@@ -1,5 +1,6 @@
 """Recordings that the tests of batches share."""
 
+import multiprocessing
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,15 @@ from fingervision.rendering import Camera, render, two_fingers
 from tests.clips import FFV1, write_clip
 
 PX_PER_MM = 20.0
+WORK = ["cv2", "av", "matplotlib.pyplot", "fingervision.cli.measure", "fingervision.cli.diagnose"]
+
+
+@pytest.fixture(autouse=True)
+def _workers_that_start_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers are forked from a process that has loaded the program; batches in processes of their own start theirs."""
+    server = multiprocessing.get_context("forkserver")
+    server.set_forkserver_preload(WORK)
+    monkeypatch.setattr("fingervision.batch.local_processes.multiprocessing.get_context", lambda method: server)
 
 
 def frames(count: int, seed: int) -> Iterator[Frame]:

@@ -221,13 +221,11 @@ CASES: list[tuple[tuple[str, ...], int, str]] = [
     # Models.
     (diagnose("m.csv", "self.toml"), 1, "is the file itself or a model based on it"),
     (diagnose("m.csv", "a.toml"), 1, "is the file itself or a model based on it"),
-    (("batch", "diagnose", "m.csv", "--model", "a.toml", "--out", "o", "--jobs", "1"), 1, "a.toml"),
     (diagnose("m.csv", "latin.toml"), 1, "latin.toml"),
     (diagnose("m.csv", "latin.toml"), 1, "0xe9 in line 2"),
     (diagnose("m.csv", "wide.toml"), 1, "UTF-16"),
     (diagnose("m.csv", "wide_unmarked.toml"), 1, "save it with the encoding UTF-8"),
     (("model", "wide.toml"), 1, "UTF-16"),
-    (("batch", "diagnose", "m.csv", "--model", "wide.toml", "--out", "o", "--jobs", "1"), 1, "UTF-16"),
     (measure("c.mkv", "--gauges", "wide.toml"), 1, "UTF-16"),
     (measure("c.mkv", "--settings", "wide.toml"), 1, "UTF-16"),
     (calibrated("wide.json"), 1, "UTF-16"),

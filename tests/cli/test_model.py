@@ -35,7 +35,7 @@ def run(*arguments: str | Path) -> str:
 
 def test_all_models_side_by_side(tmp_path: Path) -> None:
     given = drive(tmp_path / "drive.csv", [-0.5, 0.0, 1.5])
-    rows = json.loads(run(GRIPPER, "--drive", given, "--out", tmp_path / "o", "--json"))
+    rows = json.loads(run(GRIPPER, "--modes", "2", "--drive", given, "--out", tmp_path / "o", "--json"))
     assert list(rows) == list(kinds())
     assert rows["finite_element"]["gap_per_input"] == pytest.approx(7.7212, abs=0.01)
     assert rows["finite_element"]["input_at_yield_mm"] == pytest.approx(48.0 / 19.07, rel=HELD)
@@ -47,7 +47,14 @@ def test_all_models_side_by_side(tmp_path: Path) -> None:
         assert [float(row["input_mm"]) for row in table] == [-0.5, 0.0, 1.5]
         slope = (float(table[2]["gap_mm"]) - float(table[0]["gap_mm"])) / 2.0
         assert slope == pytest.approx(rows[kind]["gap_per_input"], rel=1e-6)
-    for name in ("models.png", "deformed.png"):
+    with (tmp_path / "o" / "modes.csv").open() as file:
+        modes = list(csv.DictReader(file))
+    assert len(modes) == 3 * 3 * 2
+    found = {(row["kind"], row["family"], row["number"]): float(row["frequency_hz"]) for row in modes}
+    # Plane stress has 44.6 and 357.9 Hz; the width of the hinges adds half its 2.6 % of force to the first.
+    assert found["finite_element", "drive free", "1"] == pytest.approx(44.6 * 1.013, rel=0.005)
+    assert found["finite_element", "drive held", "1"] == pytest.approx(357.9, rel=0.01)
+    for name in ("models.png", "deformed.png", "modes.png"):
         assert (tmp_path / "o" / name).read_bytes().startswith(b"\x89PNG")
 
 
@@ -66,9 +73,10 @@ def test_a_drive_in_metres_is_asked_about(tmp_path: Path) -> None:
 
 def test_a_drive_beyond_the_stress_limit_is_warned_about(tmp_path: Path) -> None:
     given = drive(tmp_path / "drive.csv", [0.0, 3.0])
-    output = run(GRIPPER, "--kind", "finite_element", "--drive", given, "--out", tmp_path)
+    output = run(GRIPPER, "--kind", "finite_element", "--mesh", "--drive", given, "--out", tmp_path)
     assert "at an input of 3 mm the stress at (35, 30) must stay below the yield of 48 MPa, but is 56.5 MPa" in output
     assert "stay within 2.55 mm" in output
+    assert (tmp_path / "mesh.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_lumped_model_warns_with_its_nominal_stress(tmp_path: Path) -> None:
@@ -97,7 +105,7 @@ def test_a_missing_gripper_is_one_sentence(tmp_path: Path) -> None:
         run(tmp_path / "none.toml")
 
 
-def test_contact_reaches_stress_warning_and_table(tmp_path: Path) -> None:
+def test_contact_reaches_stress_warning_and_a_table_without_a_line_through_the_touch(tmp_path: Path) -> None:
     """At -2 mm pressed together: a hinge beyond its yield of 48 MPa, which the free gripper (38 MPa) is not."""
     given = drive(tmp_path / "drive.csv", [-2.0, 0.0])
     output = run(GRIPPER, "--kind", "lumped", "--contact", "--drive", given, "--out", tmp_path)
@@ -105,21 +113,15 @@ def test_contact_reaches_stress_warning_and_table(tmp_path: Path) -> None:
     # Finite elements yield at -1.56 mm; the frame's fingers, pressed together, bend its hinges 5 % less.
     within = float(output.split("stay within ")[1].split(" mm")[0])
     assert within == pytest.approx(-1.56, rel=0.07)
+    # A simulation is read as straight between its rows: halfway from rest to -2 mm the fingers have long touched.
+    rows = np.genfromtxt(tmp_path / "simulation.csv", delimiter=",", names=True)
+    between = np.array([-1.37, -0.53, -0.5, -0.23])
+    expected = LumpedGripper(read_gripper(GRIPPER), Physics(contact=True)).respond(between).gap_mm
+    assert np.interp(between, rows["input_mm"], rows["gap_mm"]) == pytest.approx(expected, abs=1e-3)
     free = run(GRIPPER, "--kind", "lumped", "--drive", given, "--out", tmp_path)
     assert "must stay below the yield" not in free
     assert "the fingers touch at an input of -0.516" in free
     assert "add --contact" in free
-
-
-def test_a_sparse_drive_leaves_no_straight_line_through_the_first_touch(tmp_path: Path) -> None:
-    """A simulation is read as straight between its rows: halfway from rest to -2 mm the fingers have long touched."""
-    given = drive(tmp_path / "drive.csv", [-2.0, 0.0])
-    run(GRIPPER, "--kind", "lumped", "--contact", "--drive", given, "--out", tmp_path)
-    rows = np.genfromtxt(tmp_path / "simulation.csv", delimiter=",", names=True)
-    model = LumpedGripper(read_gripper(GRIPPER), Physics(contact=True))
-    between = np.array([-1.37, -0.53, -0.5, -0.23])
-    expected = model.respond(between).gap_mm
-    assert np.interp(between, rows["input_mm"], rows["gap_mm"]) == pytest.approx(expected, abs=1e-3)
 
 
 def test_large_rotation_reaches_stress_and_onset(tmp_path: Path) -> None:
@@ -161,12 +163,6 @@ def test_one_kinds_failure_leaves_the_others_their_results(tmp_path: Path, monke
     assert "lumped" in (tmp_path / "o" / "models.csv").read_text()
 
 
-def test_the_mesh_is_drawn(tmp_path: Path) -> None:
-    given = drive(tmp_path / "drive.csv", [0.0, 1.0])
-    run(GRIPPER, "--kind", "finite_element", "--mesh", "--drive", given, "--out", tmp_path)
-    assert (tmp_path / "mesh.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_a_sweep_follows_the_thickness(tmp_path: Path) -> None:
     rows = json.loads(run(GRIPPER, "--vary", "hinge.thickness_mm=0.9:1.1:3", "--out", tmp_path, "--json"))
     # Finite elements of other outlines: 1.561, 2.004 and 2.513 N/mm.
@@ -189,19 +185,6 @@ def test_what_cannot_be_swept_is_refused(tmp_path: Path, text: str, sentence: st
     with pytest.raises(FingervisionError, match=sentence):
         run(GRIPPER, "--vary", text, "--out", tmp_path)
     assert not (tmp_path / "vary.csv").exists()
-
-
-def test_modes_are_written_and_drawn(tmp_path: Path) -> None:
-    given = drive(tmp_path / "drive.csv", [0.0, 1.0])
-    run(GRIPPER, "--modes", "2", "--drive", given, "--out", tmp_path)
-    with (tmp_path / "modes.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 3 * 3 * 2
-    found = {(row["kind"], row["family"], row["number"]): float(row["frequency_hz"]) for row in rows}
-    # Plane stress has 44.6 and 357.9 Hz; the width of the hinges adds half its 2.6 % of force to the first.
-    assert found["finite_element", "drive free", "1"] == pytest.approx(44.6 * 1.013, rel=0.005)
-    assert found["finite_element", "drive held", "1"] == pytest.approx(357.9, rel=0.01)
-    assert (tmp_path / "modes.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_part_is_gripped(tmp_path: Path) -> None:

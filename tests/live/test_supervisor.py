@@ -157,7 +157,7 @@ def test_options_in_a_sentence_become_words_of_the_page() -> None:
 def test_a_recording_that_is_too_slow_names_the_bottleneck(
     is_busy: bool, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_module, "FRAMES_WAITING", 30)
+    monkeypatch.setattr(recorder_module, "FRAMES_WAITING", 10)
 
     def work(*_: object) -> None:
         end_s = time.thread_time() + 0.05

@@ -12,6 +12,7 @@ from fingervision.domain.effect import DriveEffect, Effect
 from fingervision.domain.parameter import Parameter
 from fingervision.effects import REGISTRY, catalogue, register
 from fingervision.testbed.bed import Bed
+from fingervision.testbed.clocks.clock import VirtualClock
 from fingervision.testing import (
     ActuatorContract,
     EffectContract,
@@ -24,7 +25,6 @@ from fingervision.testing import (
 )
 from tests.plugins.installed import effect_source
 from tests.plugins.test_devices_from_elsewhere import SPRING, STAGE
-from tests.plugins.test_devices_from_elsewhere import bed_at as bed_file
 
 
 def effect_in(folder: Path, **changes: object) -> Effect:
@@ -87,13 +87,18 @@ def test_a_model_that_does_not_keep_its_figures_is_found_out(tmp_path: Path) -> 
     assert "7.7" in failed["test_its_figures_are_those_of_its_answer"]
 
 
-def test_a_stage_in_a_file_keeps_the_contract_and_a_bad_one_does_not(tmp_path: Path) -> None:
+def test_a_stage_in_a_file_keeps_the_contract_and_a_bad_one_does_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Nobody waits for a motion.
+    monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: VirtualClock(begin_s=100.0))
     for name, source in (
         ("good", STAGE),
         ("drifts", STAGE.replace("self._from_mm = self._to_mm = self._at_mm(now_s)", "pass")),
     ):
         (tmp_path / f"{name}.py").write_text(source, encoding="utf-8")
-        path = bed_file(tmp_path, f"./{name}.py")
+        path = tmp_path / "bed.toml"
+        path.write_text(f'schema = 1\n[actuator]\nkind = "./{name}.py"\nupper_mm = 3.0\n', encoding="utf-8")
 
         class Contract(ActuatorContract):
             def open_bed(self, path: Path = path) -> Bed:

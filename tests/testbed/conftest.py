@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from fingervision.models.kinds import GripperModel, build_model
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.board.link import opened_port
@@ -15,6 +16,23 @@ from tests.testbed.emulated_board import EmulatedBoard, MotorController, compile
 
 # Factor by which the emulated board runs slower than real time, so that a loaded computer is fast enough for it.
 SLOWER = 3
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_model_of_each_gripper() -> Iterator[None]:
+    """Build the model of a gripper once, which takes as long as the rest of opening a test bed."""
+    known: list[tuple[object, GripperModel]] = []
+
+    def build(*given: object) -> GripperModel:
+        found = next((model for before, model in known if before == given), None)
+        if found is None:
+            found = build_model(*given)  # type: ignore[arg-type]
+            known.append((given, found))
+        return found
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fingervision.testbed.bed_factory.build_model", build)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -28,6 +28,22 @@ PATIENCE_S = 120.0
 LONG = steps('kind = "hold"\nat_mm = 0.2\nseconds = 60.0')
 SLOW = steps('kind = "move"\nto_mm = 0.8\nspeed_mm_s = 0.5')
 SINE = steps('kind = "sine"\nmean_mm = 0.3\namplitude_mm = 0.2\nfrequency_hz = 0.5\ncycles = 1')
+# The simulated bed with small pictures: what is held here is where the stage stands, and when.
+SMALL = """schema = 1
+[actuator]
+kind = "simulated"
+[camera]
+kind = "simulated"
+width_px = 320
+height_px = 120
+px_per_mm = 17.0
+[gripper]
+[scale]
+px_per_mm = 17.0
+[limits]
+lower_mm = -0.46
+upper_mm = 1.45
+"""
 # Frame during a slow move or a sine; the first frames are used to relate the clocks.
 UNDER_WAY = 100
 PAUSED_FRAMES = 20
@@ -55,7 +71,8 @@ def pressed(
     """Run a recipe with letters typed before some of its frames, on a test bed that can replay or one treated as
     hardware.
     """
-    bed, controls = open_bed("simulated"), Controls()
+    (folder / "small.toml").write_text(SMALL, encoding="utf-8")
+    bed, controls = open_bed(str(folder / "small.toml")), Controls()
     assert bed.camera is not None
     camera = Pressing(bed.camera, {k: lambda keys=keys: list(map(controls._letter, keys)) for k, keys in at.items()})  # type: ignore[misc]
     bed = replace(bed, camera=camera, replays=replays)  # type: ignore[arg-type]

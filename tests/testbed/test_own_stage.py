@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
+from fingervision.testbed.clocks.clock import VirtualClock
 
 ROOT = Path(__file__).parents[2]
 TUTORIAL = (ROOT / "docs" / "tutorials" / "own_stage.md").read_text(encoding="utf-8")
@@ -25,8 +26,12 @@ def called(folder: Path, *words: str) -> Result:
 
 
 @pytest.fixture(params=["", "too_fast", "too_slow"])
-def bench(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str]:
-    """The stage of the tutorial with its test bed, one that is there at once, and one of a quarter of its speed."""
+def bench(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, str]:
+    """The stage of the tutorial with its test bed, one that is there at once, and one of a quarter of its speed.
+
+    Stage and bed share a virtual clock, so that nobody waits for a motion.
+    """
+    monkeypatch.setattr("fingervision.testbed.bed_factory.HostClock", lambda: VirtualClock(begin_s=100.0))
     stage, bed = (
         re.search(rf"```\w+\n(# {name}\n.*?)```", TUTORIAL, re.DOTALL)[1]  # type: ignore[index]
         for name in ("my_stage.py", "bench.toml")

@@ -1,6 +1,5 @@
 """Controllers of stages in the network, written from their makers' protocols and apart from the kinds of stages."""
 
-import random
 import re
 import select
 import socket
@@ -8,6 +7,7 @@ import struct
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from itertools import cycle
 from operator import itemgetter
 from time import monotonic, sleep
 from typing import Any, ClassVar
@@ -54,12 +54,13 @@ class Plant:
         # Time of its beginning, begin, end and speed of every motion.
         self._motions = [(-1e9, 0.0, 0.0, 0.0)]
         self.speed = 1.0
+        self._sides = cycle((1.0, -1.0))
         self.lost_mm = self.strays_mm = 0.0
         self.homed = self.homing = False
 
     def at(self) -> float:
         with self._lock:
-            return self._at() + random.uniform(-self.strays_mm, self.strays_mm)
+            return self._at() + next(self._sides) * self.strays_mm
 
     def was_at(self, time_s: float) -> float:
         """True position at a time that has passed."""
