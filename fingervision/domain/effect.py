@@ -244,6 +244,8 @@ class Effect:
     delay_s : callable or None
         Function `delay_s(values)` that returns the delay of an effect that is a delay, or resembles a delay at slow
         motion. An effect that has `act_curved` is a delay, with `delay_s` as its only parameter.
+    most_together : float
+        Largest sum of the parameters, if they are shares of the same thing.
     wave : (str, str) or None
         Names of the parameters amplitude and period (both in mm) of an effect that is a sine over the recorded input.
     drawn_with : mapping of str to float
@@ -288,6 +290,7 @@ class Effect:
     checks: Mapping[FurtherCheck, bool] = field(default_factory=lambda: MappingProxyType({}))
     stands_at: tuple[str, ...] = ()
     delay_s: Callable[[Values], float] | None = None
+    most_together: float = float("inf")
     wave: tuple[str, str] | None = None
     drawn_with: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     odd: tuple[str, ...] = ()
@@ -312,6 +315,12 @@ class Effect:
         if isinstance(found, str) or not self.start:
             return found
         return (*found, *(_start(self.start, run) for run in range(len(history.runs))))
+
+    def within(self, values: Values) -> dict[str, float]:
+        """Return parameter values whose sum is at most `most_together`: larger ones are scaled by one factor."""
+        own = {p.name: values[p.name] for p in self.parameters if p.name in values}
+        scale = min(1.0, self.most_together / max(sum(own.values()), 1e-300))
+        return {**values, **{name: scale * value for name, value in own.items()}} if scale < 1.0 else dict(values)
 
 
 def start_key(run: int) -> str:

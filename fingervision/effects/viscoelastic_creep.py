@@ -77,6 +77,7 @@ EFFECT = PointEffect(
     ),
     needs_times=True,
     memory=True,
+    most_together=0.5,
     start="opening to which the body had relaxed before the run, minus its first opening, over the largest opening",
     narrow=narrow,
     inexact=inexact,

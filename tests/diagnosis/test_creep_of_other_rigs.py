@@ -11,6 +11,7 @@ from fingervision.diagnosis.inference.search import problem_of
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Verdict
+from fingervision.interface.column_tables import measured_from_columns
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
 from fingervision.storage.measured_table import read_measured_table
@@ -96,3 +97,21 @@ def test_creep_with_one_time_constant_is_creep_alone() -> None:
     assert found.verdict is Verdict.NAMED
     assert [effect.name for effect in found.effects] == ["viscoelastic_creep"]
     assert found.standing_share < 0.05
+
+
+def test_no_more_than_the_half_of_an_opening_creeps() -> None:
+    """Shares that exceed the whole opening would turn its sign: a mirrored gap was named creep beside a drift."""
+    time_s = np.arange(200) / 10.0
+    input_mm = 0.5 * np.sin(time_s)
+    table = measured_from_columns(
+        {"time_s": time_s.tolist(), "input_mm": input_mm.tolist(), "gap_mm": (9.0 - 5.0 * input_mm).tolist()}
+    )
+    inputs_mm, half_mm = np.array([-1.0, 1.0]), np.array([2.0, 7.0])
+    model = CorrectedModel("line", TableModel("line", inputs_mm, -half_mm, half_mm), "line.csv", (-1.0, 1.0), {})
+    problem = problem_of(prepare(table, model), None)
+    names = ("viscoelastic_creep",)
+    start = {"fraction_1s": 0.4, "fraction_4s": 0.4, "fraction_16s": 0.4, "fraction_64s": 0.4}
+    found = fit(problem, names, {names[0]: start})
+    shares = [share for name, share in found.values[names[0]].items() if name.startswith("fraction")]
+    assert sum(shares) <= 0.5 + 1e-12
+    assert found.score > 0.5 * problem.nothing().score

@@ -219,7 +219,7 @@ class _JointSquares:
         out: Point = {name: {} for name in self.order}
         for (name, parameter), value in zip(self.listed, x, strict=True):
             out[name][parameter.name] = float(value)
-        return out
+        return {name: self.problem.effects[name].within(values) for name, values in out.items()}
 
     def residual(self, x: Array) -> Array:
         """Whitened target minus prediction."""

@@ -16,9 +16,9 @@ from fingervision.effects.play_operator import play
 
 UNITS = (10.0, 25.4, 100.0, 1000.0, 1e6)
 """Ratios of units of length that are confused: powers of ten, and inches."""
-LARGEST_RATIO = 3.0
+LARGEST_RATIO = 2.03
 """Largest ratio of measured to predicted motion (or its inverse) that effects may cause: the catalogue's scale, lever
-and input errors together reach 1.3 * 1.3 * 1.2 = 2.03."""
+and input errors together reach 1.3 * 1.3 * 1.2."""
 HALF = 0.5
 """Largest share of the variance of the disagreement and (unless the gap does not follow the input at all) of the gap
 itself that a mistake in the table may leave, if it is the mistake and not an effect that explains the table."""

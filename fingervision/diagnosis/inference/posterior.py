@@ -8,7 +8,7 @@ import numpy as np
 from fingervision.diagnosis.inference.evidence import noise_doubt, odds
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, START_VARIANCE, Explanation, Point, Problem
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
-from fingervision.domain.effect import Array
+from fingervision.domain.effect import Array, Effect
 from fingervision.domain.parameter import Parameter
 
 EVALUATED = 1e6
@@ -40,6 +40,7 @@ class _Coordinates:
 
     listed: tuple[tuple[str, Parameter], ...]
     starts: Mapping[str, Mapping[str, float]]
+    effects: Mapping[str, Effect]
 
     @classmethod
     def about(cls, problem: Problem, explanation: Explanation) -> "_Coordinates":
@@ -49,7 +50,7 @@ class _Coordinates:
         for name, parameter in listed:
             if parameter.run is not None:
                 starts.setdefault(name, {})[parameter.name] = explanation.values[name].get(parameter.name, 0.0)
-        return cls(tuple(entry for entry in listed if entry[1].run is None), starts)
+        return cls(tuple(entry for entry in listed if entry[1].run is None), starts, problem.effects)
 
     def of(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Convert parameters to the sampler's coordinates; shape (p,)."""
@@ -61,7 +62,7 @@ class _Coordinates:
         for (name, parameter), x in zip(self.listed, coordinates, strict=True):
             value = _back(parameter, float(x))
             out.setdefault(name, {})[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
-        return out
+        return {name: self.effects[name].within(values) for name, values in out.items()}
 
     @property
     def bounds(self) -> tuple[Array, Array]:
