@@ -61,7 +61,7 @@ def test_play_is_named_with_its_size_whether_overshoots_are_listed_or_not(tmp_pa
     assert report.explained_share > 0.95
 
 
-@pytest.mark.parametrize("larger", ["bent_mm", "warming_mm"])
+@pytest.mark.parametrize("larger", [pytest.param("bent_mm", marks=pytest.mark.slow), "warming_mm"])
 def test_play_between_overshoots_that_are_not_listed_is_named_beside_a_larger_error(
     tmp_path: Path, larger: str
 ) -> None:

@@ -35,10 +35,9 @@ def learnt(film: Film, before: CameraModel = LINEAR_CAMERA) -> CameraModel:
 @pytest.mark.parametrize(
     ("name", "before"),
     [
-        ("glare", LINEAR_CAMERA),
         ("wall", ASSUMED_CAMERA),
         *(pytest.param(name, ASSUMED_CAMERA, marks=pytest.mark.slow) for name in ("glare", "shadow")),
-        pytest.param("shadow", LINEAR_CAMERA, marks=pytest.mark.slow),
+        *(pytest.param(name, LINEAR_CAMERA, marks=pytest.mark.slow) for name in ("glare", "shadow")),
     ],
 )
 def test_what_stands_beside_the_edges_is_learnt_and_taken_off(name: str, before: CameraModel) -> None:

@@ -34,6 +34,10 @@ def is_wrong(shot: Shot, found: GapMeasurement) -> bool:
     return abs(found.gap_px - shot.gap_px) > max(SIGMAS * np.hypot(found.u_gap_px, found.u_picture_px), HARMLESS_PX)
 
 
+# One picture of a kind is enough for each change of the code; the others are looked at with the slow tests.
+NUMBERS = pytest.mark.parametrize("number", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
+
+
 def drawn(name: str, number: int = 2, seed: int = 91) -> list[np.random.Generator]:
     return [np.random.default_rng([seed, zlib.crc32(name.encode()), k]) for k in range(number)]
 
@@ -46,15 +50,15 @@ def seen(name: str, number: int) -> tuple[Shot, GapMeasurement | NoGap]:
     return shot, measure_picture(Frame(shot.picture, 0), SETTINGS)
 
 
+@NUMBERS
 @pytest.mark.parametrize("name", GRIPPED)
-def test_a_gripped_part_never_gives_a_wrong_gap(name: str) -> None:
-    for number in range(3):
-        shot, found = seen(name, number)
-        if isinstance(found, GapMeasurement):
-            assert not is_wrong(shot, found), (found.gap_px, shot.gap_px)
-        if found.held is not None:
-            assert shot.held_px is not None
-            assert found.held.width_px == pytest.approx(shot.held_px, abs=max(4.0 * found.held.u_width_px, 0.2))
+def test_a_gripped_part_never_gives_a_wrong_gap(name: str, number: int) -> None:
+    shot, found = seen(name, number)
+    if isinstance(found, GapMeasurement):
+        assert not is_wrong(shot, found), (found.gap_px, shot.gap_px)
+    if found.held is not None:
+        assert shot.held_px is not None
+        assert found.held.width_px == pytest.approx(shot.held_px, abs=max(4.0 * found.held.u_width_px, 0.2))
 
 
 @pytest.mark.parametrize("name", ["bar-at", "disc-at", "bar-hangs-out-above"])
@@ -70,12 +74,12 @@ def test_the_notch_between_a_rounded_finger_and_a_part_that_protrudes_is_no_gap(
     assert not isinstance(found, GapMeasurement) or not is_wrong(shot, found), (found.gap_px, shot.gap_px)
 
 
-def test_a_free_part_between_open_fingers_changes_nothing() -> None:
-    for number in range(3):
-        shot, found = seen("free", number)
-        assert isinstance(found, GapMeasurement), found
-        assert found.held is None
-        assert not is_wrong(shot, found)
+@NUMBERS
+def test_a_free_part_between_open_fingers_changes_nothing(number: int) -> None:
+    shot, found = seen("free", number)
+    assert isinstance(found, GapMeasurement), found
+    assert found.held is None
+    assert not is_wrong(shot, found)
 
 
 def test_a_region_moves_the_held_part_with_everything_else() -> None:
@@ -96,11 +100,11 @@ def test_a_whole_gripper_on_its_base_is_found_without_help() -> None:
         assert not is_wrong(shot, found)
 
 
+@NUMBERS
 @pytest.mark.parametrize("name", sorted(CLUTTER))
-def test_clutter_is_right_or_refused(name: str) -> None:
-    for number in range(2):
-        shot, found = seen(name, number)
-        assert isinstance(found, NoGap) or not is_wrong(shot, found), (found, shot.gap_px)
+def test_clutter_is_right_or_refused(name: str, number: int) -> None:
+    shot, found = seen(name, number)
+    assert isinstance(found, NoGap) or not is_wrong(shot, found), (found, shot.gap_px)
 
 
 def test_a_cut_that_ends_at_the_measuring_height_is_no_fillet() -> None:
@@ -130,14 +134,14 @@ def test_a_cut_finger_beside_a_round_one() -> None:
     assert values >= 4
 
 
+@NUMBERS
 @pytest.mark.parametrize(
     "name",
     ["wire-beside", "wire-between", "part-housing", "part-standing", "turned-together", "hand-side", "table-tips"],
 )
-def test_what_is_plainly_no_finger_hinders_nothing(name: str) -> None:
-    for number in range(4):
-        _, found = seen(name, number)
-        assert isinstance(found, GapMeasurement), found
+def test_what_is_plainly_no_finger_hinders_nothing(name: str, number: int) -> None:
+    _, found = seen(name, number)
+    assert isinstance(found, GapMeasurement), found
 
 
 @pytest.mark.parametrize("name", DRAWN)
