@@ -165,11 +165,6 @@ def test_stated_defaults_are_those_of_the_budget() -> None:
     }
 
 
-def test_every_command_has_an_example() -> None:
-    for name in ("bar", "slot", "chessboard", "charuco", "check", "repeat"):
-        assert f"fingervision calibrate {name}" in run(name, "--help").output
-
-
 @pytest.mark.parametrize("first", ["frame.png", "bar.mkv"])
 def test_a_video_is_a_picture_with_its_own_transfer_tag(tmp_path: Path, first: str) -> None:
     scene = Scene(light=Light(220.0), behind=(Patch(bar(170.0, 600, x_px=320, y_px=240), 30.0),))

@@ -132,7 +132,7 @@ def test_anybody_stops_and_only_who_may_moves(session: Session, bench: Bench) ->
 
 
 def test_a_recipe_runs_and_is_stopped(session: Session, bench: Bench, tmp_path: Path) -> None:
-    (tmp_path / "recipe.toml").write_text(RECIPE)
+    (tmp_path / "recipe.toml").write_text(RECIPE.replace("to_mm = 0.8", "to_mm = 0.2"))
     words = done(session, bench, {"do": "bed_run", "recipe": "recipe.toml"})
     assert "frames" in words
     (run,) = (tmp_path / "out").glob("bed_*")
