@@ -316,6 +316,8 @@ def test_a_full_disk_stops_it_and_loses_nothing(run: Run, copy: Path, tmp_path: 
         subprocess.run(["umount", str(disk)], check=True)
 
 
+# A process that dies in any case: test_local_processes.py.
+@pytest.mark.slow
 def test_a_worker_that_is_killed_costs_nothing(recordings: Path, tmp_path: Path) -> None:
     program = [sys.executable, "-m", "fingervision", "batch", "measure", f"{recordings}/*/good*.mkv", *ALONE]
     running = subprocess.Popen([*program, "--out", "out"], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
