@@ -24,6 +24,7 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
@@ -47,6 +48,8 @@ BAND_PX, BELOW, BEYOND, COVERED_SHARE = 8, 12, 6, 0.2
 CODED_PX, BENT_SHARE, MOST_BENT_PX = 0.2, 0.1, 1.0
 # Distance from an edge, in standard deviations of its blur, at which the levels of finger and ground are taken.
 LEVEL_IN_BLURS = 3.0
+# Standard deviation of a pixel's own width, the least blur of a picture.
+PIXEL_PX = 12.0**-0.5
 # Distance (pixels) within which the outline in a band is searched from the finger's straight side.
 SEARCH_PX = 40
 # Largest share of the bands that may differ, because a part between the fingers may hide most of the inner sides; and
@@ -59,6 +62,7 @@ FEWEST_TORN, SAME_WIDTH = 2, 0.1
 # counts from this share of the fingers' contrast.
 TORN_SHARE, LEAST_STEP = 0.25, 0.08
 
+TOUCH = NoGap(Status.TOUCHING, "The fingers touch: no gap is seen between them.")
 WORDS = (
     "The fingers would have jumped in this frame alone, and their outlines are not those of the frames before and "
     "after it: the picture is damaged, or something passed in front of the fingers."
@@ -132,6 +136,15 @@ class FrameSequence:
 
     def add(self, item: Frame | LostFrame, outcome: Outcome) -> list[Judged]:
         """Take the next frame with its result, and return the frames on which the judgement is complete."""
+        if (
+            isinstance(item, Frame)
+            and isinstance(outcome, NoGap)
+            and outcome.status is Status.ONE_FINGER
+            and item.time_s is not None
+            and self._sound
+            and _is_closed(self._sound[-1], item)
+        ):
+            outcome = TOUCH
         self._waiting.append((item, outcome))
         suspects = self._suspects
         # Pictures without times are not known to be successive.
@@ -224,6 +237,28 @@ def _shows_two_places(now: _Seen, other: _Seen) -> bool:
     return False
 
 
+def _is_closed(last: _Seen, frame: Frame) -> bool:
+    """Whether what is seen at the measuring height is as wide as the two fingers of an earlier frame together."""
+    upright = last.gap.direction.is_vertical
+    pixels = frame.pixels if upright else frame.pixels.swapaxes(0, 1)
+    if frame.pixels.shape != last.frame.pixels.shape:
+        return False
+    finger = last.fingers[0]
+    along_px = finger.y_px if upright else finger.x_px
+    first = max(0, round(along_px) - (0 if along_px > finger.tip_px else BAND_PX))
+    covered = _is_like(pixels[first : first + BAND_PX], last.gap, last.looks[0].level).mean(axis=0) > 0.5
+    middle = round(0.5 * (last.positions[0][0] + last.positions[1][0]))
+    ground = np.flatnonzero(~covered)
+    before, behind = ground[ground <= middle], ground[ground >= middle]
+    if not before.size or not behind.size:
+        return False
+    seen_px = int(behind[0] - before[-1] - 1)
+    widths_px = [ends[1] - ends[0] for ends in (look.ends_px for look in last.looks)]
+    # One finger alone is narrower, and what fills the gap leaves the outer sides where they were.
+    unseen_px = max(0.5 * last.gap.gap_px, LEVEL_IN_BLURS * finger.blur_px)
+    return 0.5 * (sum(widths_px) + max(widths_px)) < seen_px < sum(widths_px) + unseen_px
+
+
 def _is_like(pixels: NDArray[Any], gap: GapMeasurement, level: float) -> NDArray[np.bool_]:
     """Which pixels have a finger's grey level rather than that of the ground."""
     grey = to_grey(np.ascontiguousarray(pixels))
@@ -289,14 +324,13 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     inwards = 1 if is_left else -1
     # Half-way between finger and ground, and relative to the outline itself: an edge that is moved in one frame alone,
     # such as by glare beside it that is not told in the next frame, is no other outline.
-    plateaus = inner_px + LEVEL_IN_BLURS * end.blur_px * np.array([-1.0, 1.0])
-    level = float(np.interp(plateaus, np.arange(below.shape[1]), below[0]).mean())
+    level, inner_level = _levels(below[0], inner_px, end.blur_px, inwards, seen.gap.gap_px)
     rises = (inwards > 0) is seen.gap.light_gap
     _, opposite = _crossings(below[:1], level, not rises)
     outside = opposite[inwards * (inner_px - opposite) > 0.0]
     outer_px = float(outside.max() if is_left else outside.min()) if outside.size else float("nan")
-    sides = ((rises, inner_px), (not rises, outer_px))
-    sides_px = np.array([_followed(below, level, *side, end.slope) for side in sides])
+    sides = ((inner_level, rises, inner_px), (level, not rises, outer_px))
+    sides_px = np.array([_followed(below, *side, end.slope) for side in sides])
     sides_px -= across_px if np.isnan(sides_px[0, 0]) else sides_px[0, 0]
     ends = sorted((inner_px, inner_px - BAND_PX * inwards if np.isnan(outer_px) else outer_px))
     ends_px = max(0, int(ends[0])), max(0, int(ends[1])) + 1
@@ -305,6 +339,20 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
         return _Look(sides_px, np.empty(0), level, ends_px)
     over = _is_like(upright[tip - bands * BAND_PX : tip, slice(*ends_px)], seen.gap, level)
     return _Look(sides_px, over.reshape(bands, -1).mean(axis=1)[::-1], level, ends_px)
+
+
+def _levels(profile: Floats, inner_px: float, blur_px: float, inwards: int, gap_px: float) -> tuple[float, float]:
+    """Levels at an edge with ground beside it, and at the inner edge, which the other finger's blur darkens.
+
+    Across a gap of a few blurs the level of the ground is nowhere reached; it follows from that in the gap's middle.
+    """
+    blur_px = max(blur_px, PIXEL_PX)
+    apart_px = min(LEVEL_IN_BLURS * blur_px, 0.5 * gap_px)
+    places = inner_px + inwards * np.array([-LEVEL_IN_BLURS * blur_px, apart_px])
+    finger, between = np.interp(places, np.arange(profile.size), profile)
+    reached = ndtr(apart_px / blur_px) - ndtr((apart_px - gap_px) / blur_px)
+    step = float(between - finger) / float(reached)
+    return float(finger) + 0.5 * step, float(finger) + step * (0.5 - float(ndtr(-gap_px / blur_px)))
 
 
 def _followed(bands: Floats, level: float, rises: bool, start_px: float, slope: float) -> Floats:

@@ -73,6 +73,38 @@ def test_true_motions_are_never_refused(motion: str) -> None:
     assert refused(MOTIONS[motion], lambda k, levels: None) == []
 
 
+@pytest.mark.parametrize(("blur_px", "step_px"), [(0.7, 0.6), (1.6, 2.0)])
+@pytest.mark.parametrize("is_upright", [True, False])
+def test_fingers_that_close_and_open_are_measured_until_they_touch(
+    blur_px: float, step_px: float, is_upright: bool
+) -> None:
+    # The edges of a gap of a few blurs darken the ground between them; once they touch, no picture alone tells one
+    # finger from two.
+    gaps_px = step_px * np.array([8, 6, 4, 3, 2, 1, 0, 0, 1, 2, 3, 4, 6])
+    camera, results = Camera(blur_px=blur_px, noise_grey=1.0), []
+    for k, gap_px in enumerate(gaps_px):
+        scene = two_fingers(gap_px, below_tip_px=6.0, width_px=60.0, frame=SIZE_PX)
+        levels = render(scene, camera, np.random.default_rng(k))
+        frame = Frame(levels if is_upright else np.ascontiguousarray(np.rot90(levels)), k, k / 25)
+        results.append((frame, measure_frame(frame, SETTINGS)))
+    statuses = [outcome.status for _, outcome in in_sequence(results)]
+    assert statuses[6:8] == [Status.TOUCHING] * 2
+    assert {each for each, gap_px in zip(statuses, gaps_px, strict=True) if gap_px > 2.0 * blur_px} == {Status.OK}
+    assert {*statuses} == {Status.OK, Status.TOUCHING}
+
+
+@pytest.mark.parametrize("covered", [slice(160, None), slice(125, 195)], ids=["other finger gone", "gap filled"])
+def test_what_has_not_the_width_of_both_fingers_does_not_touch(covered: slice) -> None:
+    results = []
+    for k in range(4):
+        levels = picture(70.0, k).copy()
+        if k == 2:
+            levels[:, covered] = levels[:, :1] if covered.stop is None else levels[200, 100]
+        frame = Frame(levels, k, k / 25)
+        results.append((frame, measure_frame(frame, SETTINGS)))
+    assert [outcome.status for _, outcome in in_sequence(results)] == [outcome.status for _, outcome in results]
+
+
 @pytest.mark.parametrize("radius_px", [8.0, 14.0])
 def test_rounded_tips_that_stand_between_rows_are_not_torn(radius_px: float) -> None:
     # The stage turns, and the measuring height of one frame is rounded to another row than that of its neighbours.
