@@ -278,8 +278,6 @@ class _Rows:
             # Rows at which the motion away from them changes: the turning point lies before or after such a row.
             tops = 1 + np.flatnonzero((way * step[:-1] > 0.0) & (way * step[1:] <= 0.0))
             for top in tops.tolist():
-                if self._still(top - 1) or self._still(top):
-                    continue
                 rest = self._rest_at(top, way)
                 if rest:
                     found += rest
@@ -332,10 +330,6 @@ class _Rows:
             share = (u[top] - u[other]) / (ahead + u[top] - u[other])
             ends.append(Corner(self.first + after, float(t[other] + share * (t[top] - t[other])), float(self.u[top])))
         return ends
-
-    def _still(self, i: int) -> bool:
-        """Whether the rows i and i + 1 are at the same place: the stage rests, so that no reversal lies beside them."""
-        return bool(abs(self.u[i + 1] - self.u[i]) <= SURELY * np.sqrt(2.0) * self.sigma_mm)
 
     def _continued(self, i: int, j: int) -> bool:
         """Whether the motions up to row i and from row j on are known, without a pause of the record."""

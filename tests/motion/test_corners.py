@@ -62,6 +62,16 @@ def test_two_equal_rows_at_an_end_are_a_stop() -> None:
     assert not reversals(strokes, EVERY_S * np.arange(strokes.size), 0.0)
 
 
+def test_rows_at_equal_distances_from_a_turn_do_not_hide_it() -> None:
+    """A stop is as possible as a turn: the gap decides, because the place is free between both."""
+    t = np.arange(0.0, 30.0, EVERY_S) + 0.5 * EVERY_S
+    u = triangle(t) + 2e-4 * np.random.default_rng(4).standard_normal(t.size)
+    points = reversals(u, t, 2e-4)
+    assert len(points) == 7
+    assert all(point.free for point in points)
+    np.testing.assert_allclose([point.input_mm for point in points], [0.0, 2.0, 0.0, 2.0, 0.0, 2.0, 0.0], atol=1e-3)
+
+
 def strokes_with_stops(dwell_s: float, hold_s: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
     """Times and inputs of the corners of six strokes of 1 mm at 0.8 mm/s, which stop at each end for a moment."""
     steps_s = [hold_s, *[1.25, dwell_s] * 6, hold_s]
