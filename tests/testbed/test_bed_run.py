@@ -59,6 +59,12 @@ def test_runs_points_and_clocks_are_as_the_recipe_says(short: Path) -> None:
     assert 0.0 < about["clocks"]["actuator"]["u_s"] < 0.002
 
 
+def test_the_frames_of_the_check_are_those_of_the_run(short: Path, tmp_path: Path) -> None:
+    done = CliRunner().invoke(cli, ["bed", "check", str(recipe_at(tmp_path)), "--json"])
+    planned, recorded = json.loads(done.stdout), len(read_samples(short / "samples.csv"))
+    assert planned["frames"] <= recorded <= planned["frames_at_most"] <= 1.1 * recorded
+
+
 def test_measuring_the_video_again_gives_the_table(short: Path, tmp_path: Path) -> None:
     assert_table_is_that_of_its_video(short, tmp_path)
 

@@ -10,7 +10,6 @@ from fingervision.cli import cli
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.drive_csv import read_samples
 from tests.testbed.board_bed import CONTRACT_STEPS, written_bed
-from tests.testbed.simulated_beds import SHORT, run
 
 HEAD = 'schema = 1\nname = "test"\nbelow_force_n = 2.9\n'
 # The triangle covers less than half of the stroke, so that the force stays below the limit of the recipe.
@@ -41,12 +40,6 @@ def test_a_run_takes_the_time_and_the_way_of_its_plan(tmp_path: Path) -> None:
     gaps = [row.gap_mm for row in rows if row.gap_mm is not None]
     low, high = (end(step["gap_mm"][k] for step in planned["steps"]) for k, end in ((0, min), (1, max)))
     assert low - 0.8 < min(gaps) < max(gaps) < high + 0.8
-
-
-def test_the_frames_of_the_check_are_those_of_the_run(tmp_path: Path) -> None:
-    planned = json.loads(check(tmp_path, SHORT[SHORT.index("[[step]]") :], "--json").stdout)
-    recorded = run(tmp_path).counts.recorded
-    assert planned["frames"] <= recorded <= planned["frames_at_most"] <= 1.1 * recorded
 
 
 def test_every_step_that_does_not_fit_is_said_with_its_line(tmp_path: Path) -> None:
