@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from math import cos, radians, sin, sqrt
+from math import cos, exp, radians, sin, sqrt
 from typing import Any, Literal
 
 import numpy as np
@@ -149,6 +149,10 @@ FlexureKind = Literal["circular", "elliptic", "filleted", "leaf", "strip"]
 _HEIGHT_THAT_BENDS = 0.13
 """Largest height that a fillet adds on either side, in thicknesses, for a section that still counts as bending: such a
 section is 1.26 times as high as the neck and twice as stiff in bending."""
+_THIN = 0.26
+"""Rate at which the restraint of a strip by its width approaches that of a thin plate as the ratio b / t of width to
+thickness grows: wedge elements of CalculiX give 0.24, 0.43, 0.70 and 0.9 of it at b / t = 1, 2, 4 and 10
+(`tests/models/test_strip_width.py`)."""
 _LEAST_SINE = 0.1
 """Least sine of the angle between two leaves that cross; others lie on each other."""
 _POISSON = 0.34
@@ -261,7 +265,7 @@ class Flexure:
         """
         if self.is_notch:
             return plane_strain_share(self.notch(plate_mm))
-        bent, swayed = strip_share(plate_mm / self.bent_mm, _POISSON)
+        bent, swayed = self._shares(plate_mm)
         if self.used is None:
             return 0.5 * (bent + swayed)
         return (self.used[0] * bent + self.used[1] * swayed) / max(self.used[0] + self.used[1], 1e-300)
@@ -270,8 +274,14 @@ class Flexure:
         """Half of the range in which `width_share` may lie, because the conditions at a strip's ends are unknown."""
         if self.is_notch or self.used is not None:
             return 0.0
-        bent, swayed = strip_share(plate_mm / self.bent_mm, _POISSON)
+        bent, swayed = self._shares(plate_mm)
         return 0.5 * (swayed - bent)
+
+    def _shares(self, plate_mm: float) -> tuple[float, float]:
+        """Weights of `strip_share`, reduced where the bodies yield as the thick strip warps."""
+        held = 1.0 - exp(-_THIN * plate_mm / self.thickness_mm)
+        bent, swayed = strip_share(plate_mm / self.bent_mm, _POISSON)
+        return held * bent, held * swayed
 
     def crosses(self, other: "Flexure") -> float | None:
         """Position along the axis at which the axis of another leaf crosses this leaf; None if it does not."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
+from fingervision.models.planar_region import PlanarRegion, face_ends_mm, sharp_corners_mm
 from fingervision.models.plane_shapes import Curve
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ def size_field(region: PlanarRegion, across: float, body_mm: float) -> SizeField
             size = _sizes(curve, t, others, across, min(body_mm, length[-1]), region.size_mm)
         points.append(curve.at(t).T)
         sizes.append(size)
-    for corner in sharp_corners_mm(region):
+    for corner in (*sharp_corners_mm(region), *face_ends_mm(region)):
         near = [float(s[np.argmin(np.hypot(*(p - corner).T))]) for p, s in zip(points, sizes, strict=True)
                 if np.hypot(*(p - corner).T).min() < _SMALLEST * region.size_mm]  # fmt: skip
         points.append(corner[None, :])

@@ -135,12 +135,22 @@ def _loops_of(steps: tuple[tuple[bool, Shape], ...], marks_mm: tuple[Point, ...]
 
 def sharp_corners_mm(region: PlanarRegion) -> list[Array]:
     """Re-entrant corners without a radius, at which the stress is singular (mm)."""
+    return [after.start_mm for _, after, turn in _joints(region) if turn < _TURNS_IN]
+
+
+def face_ends_mm(region: PlanarRegion) -> list[Array]:
+    """Points on straight sides of the outline at which faces begin and end; the stress is singular there too (mm)."""
+    straight = ((after, turn) for before, after, turn in _joints(region) if before.is_straight and after.is_straight)
+    return [after.start_mm for after, turn in straight if abs(turn) < _SAME]
+
+
+def _joints(region: PlanarRegion) -> list[tuple[Curve, Curve, float]]:
+    """Neighbouring curves of the outline, each pair with the sine of the angle of its turn to the left."""
     found = []
     for loop in region.loops:
         for before, after in zip(loop.curves, loop.curves[1:] + loop.curves[:1], strict=True):
             a, b = before.direction(np.array([before.t1]))[:, 0], after.direction(np.array([after.t0]))[:, 0]
-            if a[0] * b[1] - a[1] * b[0] < _TURNS_IN:
-                found.append(after.start_mm)
+            found.append((before, after, float(a[0] * b[1] - a[1] * b[0])))
     return found
 
 

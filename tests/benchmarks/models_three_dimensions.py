@@ -1,4 +1,8 @@
-"""Compare slope, force and modes of drawings to which nothing was fitted with wedge elements of CalculiX."""
+"""Compare drawings to which nothing was fitted with wedge elements of CalculiX: motions, force, stress and modes.
+
+`--both-ways` takes eight other mechanisms, of which cuts leave three, each with its driven face free to turn and held,
+and prints every difference beside the error that the product states for it.
+"""
 
 import shutil
 import sys
@@ -7,11 +11,14 @@ from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fingervision.domain.gripper import Gripper
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_mechanism import half_mechanism, whole_mechanism
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism_figures import mechanism_figures
 from fingervision.models.out_of_plane import out_of_plane
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.triangulate import triangulate
@@ -19,7 +26,7 @@ from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.models_held_out import ABS, ALUMINIUM, SILICON, STEEL, TITANIUM, drawn
-from tests.benchmarks.solid_reference import solid_answer
+from tests.benchmarks.solid_reference import SolidAnswer, solid_answer
 
 ROOT = Path(__file__).parents[2]
 # Columns: material, scale of the published drawing (with links of 17.7 to 19.4 mm), then hinge thickness, radius and
@@ -34,6 +41,8 @@ GRIPPERS = (
     (ABS, 1.0, 0.8, 3.5, 16.0, 3.0, -2.0),
     (TITANIUM, 2.0, 0.8, 7.0, 2.5, -2.0, 0.0),
 )
+ACROSS = 3.0
+"""The same number of triangles where the stress is compared too."""
 FINER = (2.0, 0.05)
 """Two refinements of the plane mesh of the solid elements: number of triangles across, and edge length over size."""
 
@@ -92,31 +101,86 @@ def cases() -> list[tuple[str, Mechanism, Gripper | None]]:
     return found
 
 
-def _percent(ours: float, solid: float | None) -> str:
-    return f"{100.0 * (ours / solid - 1.0):+7.3f}" if solid else "      -"
+def _percent(ours: float, solid: float) -> str:
+    return f"{100.0 * (ours / solid - 1.0):+7.3f}"
+
+
+def _marked(mechanism: Mechanism) -> PlanarRegion:
+    """The body with nodes at its probes."""
+    region = mechanism.region
+    return PlanarRegion(region.steps, (*region.marks_mm, *mechanism.probes.values()))
+
+
+def both_ways(asked: Namespace) -> None:
+    """Print, for each mechanism and way of driving, the differences in % and the stated errors."""
+    print("drawing, face: model | motion | force | stress | modes with free and held drive; each difference (stated)")
+    missed, unsaid, count = 0, 0, 0
+    for place, path in enumerate(sorted((Path(__file__).parent / "mechanisms" / "both_ways").glob("*.toml"))):
+        if asked.only is not None and place not in asked.only:
+            continue
+        drawing = read_drawing(path).mechanism()
+        mesh = triangulate(_marked(drawing), ACROSS * asked.finer, FINER[1] * drawing.region.size_mm / asked.finer)
+        for turns in ("free", "held"):
+            mechanism = replace(drawing, drives=tuple(replace(drive, turns=turns) for drive in drawing.drives))
+            began = time.perf_counter()
+            solid = solid_answer(mechanism, mesh, layers=asked.layers, modes=("free", "held"), count=3)
+            size, seconds = mesh.triangles.shape[1], time.perf_counter() - began
+            print(f"{place} {mechanism.name}, {turns}: {solid.force_n:.5g} N, {solid.stress_mpa:.5g} MPa "
+                  f"({size} wedges a layer, {seconds:.0f} s)", flush=True)  # fmt: skip
+            for kind in (MechanismPlate, MechanismFrame):
+                cells = []
+                for name, bar, difference, stated in differences(kind(mechanism), solid):
+                    short = abs(difference) > bar + (1.5 if (name, kind) == ("force", MechanismFrame) else 0.0)
+                    over = abs(difference) > stated
+                    missed, unsaid, count = missed + short, unsaid + over, count + 1
+                    cells.append(f"{difference:+6.2f} ({stated:.2f}){'*' if short else ''}{'!' if over else ''}")
+                print(f"    {kind.kind:14s} | {' | '.join(cells)}", flush=True)
+    print(f"of {count} figures {missed} are beyond the bar (*), and {unsaid} beyond the stated error (!)")
+
+
+def differences(model: MechanismPlate | MechanismFrame, solid: SolidAnswer) -> list[tuple[str, float, float, float]]:
+    """Name, bar, difference from the solid and stated error of every figure (%); a refused stress has none."""
+    unit, figures = model.state(1.0), mechanism_figures(model)
+    moved, theirs = (np.array(list(probes.values())) for probes in (unit.probes_mm, solid.probes_mm))
+    motion = 100.0 * float(np.hypot(*(moved - theirs).T).max() / np.hypot(*theirs.T).max())
+    found = [
+        ("motion", 0.5, motion, figures.get("model_error_motion_percent", 0.0)),
+        ("force", 1.5, 100.0 * (unit.force_n / solid.force_n - 1.0), figures["model_error_force_percent"]),
+    ]
+    if "peak_stress_mpa_per_mm" in figures:
+        stress = 100.0 * (unit.stress_mpa / solid.stress_mpa - 1.0)
+        found.append(("stress", 2.0, stress, figures["model_error_stress_percent"]))
+    for held in (False, True):
+        ours = model.modes_hz(drive_held=held)
+        apart = (100.0 * (a / b - 1.0) for a, b in zip(ours, solid.modes_hz["held" if held else "free"], strict=True))
+        found += [("mode", 2.0, each, figures["model_error_modes_percent"]) for each in apart]
+    return found
 
 
 @benchmark(
     only={"type": int, "nargs": "*", "help": "places of drawings in the list; all without"},
-    layers={"type": int, "default": 4, "help": "wedges through the plate"},
+    layers={"type": int, "default": 2, "help": "wedges through half the plate"},
+    both_ways=False,
+    finer={"type": float, "default": 1.0, "help": "with --both-ways: factor by which the elements are finer"},
 )
 def main(asked: Namespace) -> None:
     """Print one line per drawing: errors (%) of the plane models compared with the three-dimensional model."""
     if shutil.which("ccx") is None:
         sys.exit("CalculiX (ccx, Debian package calculix-ccx) must be installed, but is not.")
+    if asked.both_ways:
+        both_ways(asked)
+        return
     print("drawing | largest motion of a probe: finite_element, lumped | force: same | mode in the plane, drive held: "
           "same | out of the plane: finite_element | s of CalculiX")  # fmt: skip
     for place, (title, mechanism) in enumerate(cases()):
         if asked.only is not None and place not in asked.only:
             continue
         region = mechanism.region
-        marked = PlanarRegion(region.steps, (*region.marks_mm, *mechanism.probes.values()))
         began = time.perf_counter()
-        solid = solid_answer(mechanism, triangulate(marked, FINER[0], FINER[1] * region.size_mm), layers=asked.layers,
-                             modes=3)  # fmt: skip
+        mesh = triangulate(_marked(mechanism), FINER[0], FINER[1] * region.size_mm)
+        solid = solid_answer(mechanism, mesh, layers=asked.layers)
         seconds = time.perf_counter() - began
-        flat = next((value for value, out in solid.modes if not out), None)
-        lifted = next((value for value, out in solid.modes if out), None)
+        flat, lifted = solid.modes_hz["held"][0], solid.modes_hz["out"][0]
         cells: list[list[str]] = [[], [], []]
         far, way = max(
             ((name, axis) for name in solid.probes_mm for axis in (0, 1)),

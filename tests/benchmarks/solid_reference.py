@@ -1,19 +1,21 @@
 """A mechanism in three dimensions by CalculiX: quadratic wedge elements, independent of the models of the package.
 
-The plane mesh is finer than that of the model. Fixed faces are fixed in all directions, sliding faces in their
-constrained direction. A face parallel to its drive's direction is driven in its mean motion, as in the models, by an
-equation for its nodes; the force is then the reaction of the fixed faces.
+The plane mesh is finer than that of the model. Half of the plate is meshed: its middle plane stays plane for motions in
+the plane, and cannot move in the plane for motions out of it. Fixed faces are fixed in all directions, sliding faces in
+their constrained direction. Equations for the nodes of a driven face say what it may do; the force is the reaction of
+the fixed faces.
 """
 
 import subprocess
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.models.mechanism import Face, Mechanism
+from fingervision.models.mechanism import Drive, Face, Mechanism
+from fingervision.models.planar_region import sharp_corners_mm
 from fingervision.models.triangulate import PlaneMesh
 
 Array = NDArray[np.float64]
@@ -33,17 +35,20 @@ class SolidAnswer:
         Force at the drive.
     probes_mm : dict of str to (float, float)
         Motion of each probe, at the nearest node of the middle plane.
-    modes : tuple of (float, bool)
-        Natural frequencies with fixed drive, each with a flag that is True for out-of-plane modes.
+    stress_mpa : float
+        Largest von Mises stress in the flexures at any depth, without what is within half a thickness of sharp corners.
+    modes_hz : dict of str to tuple of float
+        Natural frequencies in the plane with the drive `free` and `held`, and with fixed drive `out` of the plane.
     """
 
     force_n: float
     probes_mm: dict[str, tuple[float, float]]
-    modes: tuple[tuple[float, bool], ...]
+    stress_mpa: float
+    modes_hz: dict[str, tuple[float, ...]]
 
 
 class Wedges:
-    """Fifteen-node wedge elements on a plane mesh, in layers that are thinner at the plate's faces.
+    """Fifteen-node wedge elements on a plane mesh, from the middle plane up, in layers that are thinner at the surface.
 
     Parameters
     ----------
@@ -52,14 +57,14 @@ class Wedges:
     plate_mm : float
         Thickness of the plate.
     layers : int
-        Number of layers, even so that the middle plane contains nodes.
+        Number of layers in half the plate.
     """
 
     def __init__(self, mesh: PlaneMesh, plate_mm: float, layers: int) -> None:
         self.plane, self.layers = mesh, layers
         count = mesh.nodes_mm.shape[1]
         corners = np.unique(mesh.triangles[:3])
-        levels = 0.5 * plate_mm * np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, layers + 1))
+        levels = 0.5 * plate_mm * np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, layers + 1))
         levels = np.sort(np.concatenate([levels, 0.5 * (levels[1:] + levels[:-1])]))
         number = np.zeros((2 * layers + 1, count), dtype=np.int64)
         places: list[Array] = []
@@ -71,7 +76,7 @@ class Wedges:
             planes.append(nodes)
         self.nodes_mm: Array = np.vstack(places)
         self.plane_node: Indices = np.concatenate(planes)
-        self.middle: Indices = number[layers]
+        self.middle: Indices = number[0]
         a, b, c, ab, bc, ac = mesh.triangles
         rows = []
         for layer in range(layers):
@@ -122,8 +127,9 @@ def solid_answer(
     mechanism: Mechanism,
     mesh: PlaneMesh,
     *,
-    layers: int = 4,
-    modes: int = 2,
+    layers: int = 2,
+    modes: tuple[str, ...] = ("held", "out"),
+    count: int = 2,
     input_mm: float = 1.0,
     large: bool = False,
 ) -> SolidAnswer:
@@ -132,11 +138,15 @@ def solid_answer(
     Parameters
     ----------
     mechanism : Mechanism
-        Drawing of a mechanism that is driven along x or y, with the perpendicular motion free or fixed.
+        Drawing of a mechanism that is driven along x or y.
     mesh : PlaneMesh
         Triangles of the drawing.
-    layers, modes : int
-        Number of wedges through the plate, and number of natural frequencies.
+    layers : int
+        Number of wedges through half the plate.
+    modes : tuple of str
+        Which natural frequencies, see `SolidAnswer`.
+    count : int
+        Number of natural frequencies of each.
     input_mm : float
         Motion of the drive.
     large : bool
@@ -144,62 +154,91 @@ def solid_answer(
     """
     if len(mechanism.drives) > 1:
         raise ValueError("several drives are checked by their energy: tests/models/test_several_drives.py")
-    size_mm = mechanism.region.size_mm
     body = Wedges(mesh, mechanism.plate_mm, layers)
-    driven = mechanism.drives[0]
-    drive = body.on(driven.face, size_mm)
-    lines = ["*NODE, NSET=ALL", *(f"{i},{x:.12g},{y:.12g},{z:.12g}" for i, (x, y, z) in enumerate(body.nodes_mm, 1))]
-    lines.append("*ELEMENT, TYPE=C3D15, ELSET=BODY")
-    lines += [f"{i}," + ",".join(map(str, row)) for i, row in enumerate(body.elements.tolist(), 1)]
-    sets = {"DRIVE": drive} | {f"FIXED{i}": body.on(face, size_mm) for i, face in enumerate(mechanism.fixed)}
-    sets |= {f"SLIDE{i}": body.on(face, size_mm) for i, (face, _) in enumerate(mechanism.slides)}
     watched = {name: int(body.middle[_nearest(mesh, point)]) for name, point in mechanism.probes.items()}
-    sets |= {"WATCHED": np.array(sorted(set(watched.values())))}
+    sets = _sets(mechanism, body) | {"WATCHED": np.array(sorted(set(watched.values())))}
+    driven = mechanism.drives[0]
+    along = 1 if driven.direction[0] != 0.0 else 2
+    axes = [1 + "xy".index(component) for _, component in mechanism.slides]
+    if along in axes:
+        raise ValueError("the fixed faces must take the whole force")
+    free, ref = len(body.nodes_mm) + 1, len(body.nodes_mm) + 2
+    lines = ["*NODE, NSET=ALL", *(f"{i},{x:.12g},{y:.12g},{z:.12g}" for i, (x, y, z) in enumerate(body.nodes_mm, 1))]
+    lines += [f"{free},0,0,0", f"{ref},0,0,0", "*ELEMENT, TYPE=C3D15, ELSET=BODY"]
+    lines += [f"{i}," + ",".join(map(str, row)) for i, row in enumerate(body.elements.tolist(), 1)]
     for name, members in sets.items():
         lines += [f"*NSET, NSET={name}", *(f"{node}," for node in members.tolist())]
     material = mechanism.material
     lines += ["*MATERIAL, NAME=BULK", "*ELASTIC", f"{material.youngs_modulus_mpa:.12g},{material.poisson_ratio:.12g}"]
-    lines += ["*DENSITY", f"{material.density_t_mm3:.12g}", "*SOLID SECTION, ELSET=BODY, MATERIAL=BULK", "*BOUNDARY"]
-    lines += [f"FIXED{i},1,3" for i in range(len(mechanism.fixed))]
-    axes = [1 + "xy".index(component) for _, component in mechanism.slides]
-    lines += [f"SLIDE{i},{axis},{axis}" for i, axis in enumerate(axes)]
-    across = 1 if driven.across == "held" else 0
-    along = 1 if driven.direction[0] != 0.0 else 2
+    lines += ["*DENSITY", f"{material.density_t_mm3:.12g}", "*SOLID SECTION, ELSET=BODY, MATERIAL=BULK"]
+    supports = [f"FIXED{i},1,3" for i in range(len(mechanism.fixed))]
+    supports += [f"SLIDE{i},{axis},{axis}" for i, axis in enumerate(axes)]
+    in_plane = [*_equations(driven, body, sets["DRIVE"], along, free, ref), "*BOUNDARY", *supports, "MIDDLE,3,3"]
     sign = driven.direction[along - 1]
-    kept = [f"DRIVE,{3 - along},{3 - along}"] if across else []
-    spread = np.ptp(body.nodes_mm[drive - 1][:, :2], axis=0)
-    in_mean = not across and (driven.turns == "free" or spread[along - 1] > _ON * size_mm)
-    moved_by = f"{along},{along},{sign * input_mm:.12g}"
-    pushed, reacting = f"DRIVE,{moved_by}", ["DRIVE"]
-    unequal = list(lines)
-    if in_mean:
-        if any(axis == along for axis in axes):
-            raise ValueError("a face driven in the mean needs fixed faces that take the whole force")
-        weights = sorted(body.mean_over(drive).items(), key=lambda item: -item[1])
-        count = len(body.nodes_mm) + 1
-        lines[1:1] = [f"{count},0,0,0"]
-        lines += ["*EQUATION", f"{len(weights) + 1}", *(f"{node},{along},{w:.12g}" for node, w in weights)]
-        lines += [f"{count},{along},-1"]
-        pushed, reacting = (
-            f"{count},{along},{along},{sign * input_mm:.12g}",
-            [f"FIXED{i}" for i in range(len(mechanism.fixed))],
-        )
-    # Nodes of the middle plane stay in this plane; otherwise a body with sliding faces only could drift away.
     static = ["*STEP, NLGEOM", "*STATIC", "0.5,1."] if large else ["*STEP", "*STATIC"]
-    static += ["*BOUNDARY", pushed, "DRIVE,3,3", *kept, "*NODE PRINT, NSET=WATCHED, FREQUENCY=100", "U"]
-    for name in reacting:
-        static += [f"*NODE PRINT, NSET={name}, TOTALS=ONLY, FREQUENCY=100", "RF"]
-    static += ["*END STEP"]
-    vibrating = ["*BOUNDARY", "DRIVE,1,3", "*STEP", "*FREQUENCY", f"{modes}", "*NODE FILE", "U", "*END STEP"]
+    static += ["*BOUNDARY", f"{free},{along},{along},{sign * input_mm:.12g}", f"{ref},{3 - along},{3 - along}"]
+    static += ["*NODE PRINT, NSET=WATCHED, FREQUENCY=100", "U", "*EL FILE, FREQUENCY=100", "S"]
+    for i in range(len(mechanism.fixed)):
+        static += [f"*NODE PRINT, NSET=FIXED{i}, TOTALS=ONLY, FREQUENCY=100", "RF"]
+    still = {
+        "held": [*in_plane, f"{free},{along},{along}", f"{ref},{3 - along},{3 - along}"],
+        "free": [*in_plane, f"{ref},{3 - along},{3 - along}"],
+        "out": ["*BOUNDARY", *supports, "MIDDLE,1,2", "DRIVE,1,3"],
+    }
+    vibrating = ["*STEP", "*FREQUENCY", f"{count}", "*END STEP"]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        moved, force = _static(_run(folder, "static", [*lines, *static], ".dat"), -sign if in_mean else sign, along)
-        text = _run(folder, "modes", [*unequal, *vibrating], ".dat") if modes else ""
-        shapes = (folder / "modes.frd").read_text(encoding="ascii", errors="replace") if modes else ""
-    frequencies = _frequencies(text)
-    out = _out_of_plane(shapes, len(body.nodes_mm), len(frequencies))
-    probes = {name: moved[node] for name, node in watched.items()}
-    return SolidAnswer(force, probes, tuple(zip(frequencies, out, strict=True)))
+        moved, force = _static(_run(folder, "static", [*lines, *in_plane, *static, "*END STEP"]), -2.0 * sign, along)
+        stress = _peak(mechanism, body, _nodal_stress(folder / "static.frd", len(body.nodes_mm)))
+        found = {kind: _frequencies(_run(folder, kind, [*lines, *still[kind], *vibrating])) for kind in modes}
+    return SolidAnswer(force, {name: moved[node] for name, node in watched.items()}, stress, found)
+
+
+def _sets(mechanism: Mechanism, body: Wedges) -> dict[str, Indices]:
+    size_mm = mechanism.region.size_mm
+    sets = {"DRIVE": body.on(mechanism.drives[0].face, size_mm), "MIDDLE": body.middle}
+    sets |= {f"FIXED{i}": body.on(face, size_mm) for i, face in enumerate(mechanism.fixed)}
+    return sets | {f"SLIDE{i}": body.on(face, size_mm) for i, (face, _) in enumerate(mechanism.slides)}
+
+
+def _equations(driven: Drive, body: Wedges, nodes: Indices, along: int, free: int, ref: int) -> list[str]:
+    """What a driven face may do: sums of motions of its nodes that are those of two nodes without mass.
+
+    Node `free` has the motion along the drive, node `ref` the motion across it, which is zero where it is held.
+    """
+    places = body.nodes_mm[nodes - 1]
+    across = 3 - along
+    weights = body.mean_over(nodes)
+    mean = np.array([weights.get(node, 0.0) for node in nodes.tolist()])
+    sums: list[tuple[int, Array, int]] = []
+    is_along = np.ptp(places[:, across - 1]) < _ON * np.ptp(places[:, :2])
+    if driven.turns == "free" or (is_along and driven.across == "free"):
+        sums = [(along, mean, free)] + ([(across, mean, ref)] if driven.across == "held" else [])
+        if driven.turns == "held":
+            level = places[:, along - 1]
+            sums.append((across, mean * (level - mean @ level), 0))
+    else:
+        each = np.eye(nodes.size)
+        sums = [(along, row, free) for row in each]
+        sums += [(across, row, ref) for row in each] if driven.across == "held" else []
+    lines: list[str] = []
+    for axis, row, other in sums:
+        terms = [f"{nodes[place]},{axis},{row[place]:.12g}" for place in np.argsort(-np.abs(row)) if row[place] != 0.0]
+        terms += [f"{other},{axis},-1"] if other else []
+        lines += ["*EQUATION", f"{len(terms)}", *terms]
+    return lines
+
+
+def _peak(mechanism: Mechanism, body: Wedges, mises_mpa: Array) -> float:
+    """Largest stress in the flexures, without what is within half a thickness of sharp corners."""
+    points = body.nodes_mm[:, :2].T
+    near_mm = 0.5 * min(flexure.thickness_mm for flexure in mechanism.flexures)
+    zones = [flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures]
+    zones = [replace(zone, half_height_mm=zone.half_height_mm + _ON * near_mm) for zone in zones]
+    inside = np.any([zone.holds(points) for zone in zones], axis=0)
+    for corner in sharp_corners_mm(mechanism.region):
+        inside &= np.hypot(points[0] - corner[0], points[1] - corner[1]) >= near_mm
+    return float(mises_mpa[inside].max())
 
 
 def _nearest(mesh: PlaneMesh, point: tuple[float, float]) -> int:
@@ -207,10 +246,10 @@ def _nearest(mesh: PlaneMesh, point: tuple[float, float]) -> int:
     return int(np.argmin(np.hypot(x - point[0], y - point[1])))
 
 
-def _run(folder: Path, job: str, lines: list[str], ending: str) -> str:
+def _run(folder: Path, job: str, lines: list[str]) -> str:
     (folder / f"{job}.inp").write_text("\n".join(lines) + "\n", encoding="ascii")
     subprocess.run(["ccx", job], cwd=folder, check=True, capture_output=True, timeout=1200)
-    return (folder / f"{job}{ending}").read_text(encoding="ascii", errors="replace")
+    return (folder / f"{job}.dat").read_text(encoding="ascii", errors="replace")
 
 
 def _static(text: str, sign: float, along: int) -> tuple[dict[int, tuple[float, float]], float]:
@@ -225,7 +264,7 @@ def _static(text: str, sign: float, along: int) -> tuple[dict[int, tuple[float, 
     return moved, force
 
 
-def _frequencies(text: str) -> list[float]:
+def _frequencies(text: str) -> tuple[float, ...]:
     found = []
     for line in text.splitlines():
         cells = line.split()
@@ -233,20 +272,20 @@ def _frequencies(text: str) -> list[float]:
             found.append(float(cells[3]))
         elif "P A R T I C I P A T I O N" in line:
             break
-    return found
+    return tuple(found)
 
 
-def _out_of_plane(text: str, nodes: int, modes: int) -> list[bool]:
-    """Whether most of each mode's squared displacement is along z, from the fixed columns of a .frd file."""
-    squares: list[Array] = []
+def _nodal_stress(path: Path, nodes: int) -> Array:
+    """Von Mises stress at every node, from the fixed columns of a .frd file."""
+    found = np.zeros(nodes)
     reading = False
-    for line in text.splitlines():
-        if line.startswith(" -4  DISP"):
+    for line in path.read_text(encoding="ascii", errors="replace").splitlines():
+        if line.startswith(" -4  STRESS"):
             reading = True
-            squares.append(np.zeros(3))
         elif line.startswith(" -3"):
             reading = False
         elif reading and line.startswith(" -1"):
-            squares[-1] += [float(line[13 + 12 * i : 25 + 12 * i]) ** 2 for i in range(3)]
-    del nodes
-    return [bool(part[2] > part[0] + part[1]) for part in squares[:modes]]
+            xx, yy, zz, xy, yz, zx = (float(line[13 + 12 * i : 25 + 12 * i]) for i in range(6))
+            squares = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * (xy**2 + yz**2 + zx**2)
+            found[int(line[3:13]) - 1] = squares**0.5
+    return found

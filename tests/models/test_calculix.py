@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (D
 # on geometry only.
 SLOPE = 1e-3
 FORCE = 0.04
-LAYERS = 2
+LAYERS = 1
 ON_MM = 1e-6
 
 
@@ -34,7 +34,7 @@ def test_three_dimensions_agree(
     top = sorted(inner[1].tolist())[-3:]
     probes = {f"{y}": (gripper.tip_corner_mm[0], y) for y in top}
     half = replace(half_mechanism(gripper), mirrored=False, probes=probes, pairs={})
-    solid = solid_answer(half, mesh, layers=LAYERS, modes=0, input_mm=input_mm, large=large)
+    solid = solid_answer(half, mesh, layers=LAYERS, modes=(), input_mm=input_mm, large=large)
     across = [solid.probes_mm[name][0] for name in probes]
     moved = float(np.polyval(np.polyfit(top, across, 2), gripper.measuring_point_mm[1]))
     ours = finite_element.elastic.state(input_mm, large_rotation=large)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingervision.domain.errors import DataError
+from fingervision.domain.errors import FingervisionError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import bodies_of
@@ -118,10 +118,6 @@ def test_a_corner_that_is_rounded_is_not_sharp(tmp_path: Path) -> None:
     assert len(sharp_corners_mm(sharp.region)) == 1
     assert not sharp_corners_mm(rounded.region)
     assert np.isfinite(MechanismPlate(rounded).state(0.1).stress_mpa)
-    for at, radius, said in (("[16, 16]", 3, "(10, 10)"), ("[10, 10]", 25, "20 mm")):
-        with pytest.raises(DataError) as error:
-            drawn(tmp_path, shape + fillet.replace("[10.5, 10]", at).replace("= 3", f"= {radius}") + rest)
-        assert said in str(error.value)
 
 
 def test_a_mirrored_half_is_the_whole_that_is_written_out(tmp_path: Path) -> None:
@@ -134,22 +130,71 @@ def test_a_mirrored_half_is_the_whole_that_is_written_out(tmp_path: Path) -> Non
     assert [face.box_mm for face in copied.fixed] == [face.box_mm for face in written.fixed]
 
 
-def test_copies_turn_and_move_and_name_what_is_wrong(tmp_path: Path) -> None:
+def test_copies_turn_and_move(tmp_path: Path) -> None:
     turned = COPIED.replace("mirror_x_mm = 0", "turn_deg = 180\nabout_mm = [0, 23]")
     point = drawn(tmp_path, HALF + turned.replace('"foot", "leaf", "ground", ', "")).probes["end right"]
     assert point == pytest.approx((10.0, 23.0))
     moved = COPIED.replace("mirror_x_mm = 0", "by_mm = [15, 0]")
     assert drawn(tmp_path, HALF + moved).region.steps == drawn(tmp_path, HALF + WRITTEN).region.steps
-    wrong = (
-        (COPIED.replace('"foot"', '"foto"'), "foto"),
-        (COPIED.replace(" right", ""), "suffix"),
-        (COPIED.replace("mirror_x_mm = 0", "turn_deg = 45"), "ground"),
-        (COPIED + COPIED.lstrip(), "end right"),
-        (COPIED.replace("mirror_x_mm = 0", "mirror_x_mm = 0\nmirror_y_mm = 0"), "mirror_y_mm"),
-    )
-    for text, said in wrong:
-        with pytest.raises(DataError, match=said):
-            drawn(tmp_path, HALF + text)
+
+
+FILLET, BODY, MORE = "[[fillet]]\nat_mm = ", "[[body]]\n", "[[copy]]\nof = "
+WRONG = [
+    (FILLET + "[0, 0]\nradius_mm = 1", "fillet.at_mm", "(-5, 0) mm"),
+    (FILLET + "[-10, 26]\nradius_mm = 30", "fillet.at_mm", "(-10, 26) mm"),
+    (FILLET + "[-10, 26]\nradius_mm = -1", "fillet.radius_mm", "is -1"),
+    (FILLET + "[-10, 26]", "[fillet]", "radius_mm"),
+    (FILLET + "[-10]\nradius_mm = 1", "fillet.at_mm", "[-10]"),
+    (MORE + '["nobody"]', "copy 2.of", "no nobody"),
+    (MORE + '"leaf"', "copy 2.of", "'leaf'"),
+    (MORE + '["leaf"]\nsuffix = ""', "copy 2.suffix", "empty"),
+    (MORE + '["leaf"]\nsuffix = " right"', "copy 2.suffix", "leaf right"),
+    (MORE + '["leaf"]\nmirror_x = 0', "copy 2.mirror_x", "mirror_x_mm"),
+    (MORE + '["leaf"]\nmirror_x_mm = 0\nmirror_y_mm = 0', "copy 2.mirror_y_mm", "180"),
+    (MORE + '["ground"]\nturn_deg = 30', "copy 2.turn_deg", "ground"),
+    (MORE + '["end"]\nby_mm = [100, 0]\nsuffix = " far"', "probe end far", "(90, 23) mm"),
+    (MORE + '["foot"]\nby_mm = [100, 0]\nsuffix = " far"', "x 90 to 95", "foot far"),
+    (MORE + '["leaf"]\nby_mm = [0.1, 0]\nsuffix = " near"', "flexure leaf", "(-7.5, 13) mm"),
+    (BODY + "polygon_mm = [[0, 0], [5, 5], [5, 0], [0, 5]]", "body 3.polygon_mm", "crossing"),
+    (BODY + "polygon_mm = [[0, 22], [5, 22], [5, 24]]\nbulges = [0.5]", "body 3.bulges", "are 1"),
+    (BODY + "box_mm = [0, 5, 22, 24]\nbulges = [1]", "body 3.bulges", "box_mm"),
+    (BODY + 'outline = "missing.dxf"', "missing.dxf", "no drawing"),
+    (BODY + 'outline = "mechanism.toml"', "mechanism.toml", ".dxf or .svg"),
+    (BODY + 'outline = "a.dxf"\nbox_mm = [0, 1, 0, 1]', "body 3", "box_mm and outline"),
+    (BODY + 'outline = "a.svg"\nunit_mm = 0', "body 3.unit_mm", "is 0"),
+]
+CHANGED = [
+    ("half_length_mm = 8", "half_length_mm = 3", ["x 5 to 10, y 0 to 6 mm (foot right)"]),
+    ("thickness_mm = 0.5", "thickness_mm = 0", ["flexure.thickness_mm"]),
+    ("thickness_mm = 0.5", "thickness_mm = 20", ["flexure leaf"]),
+    ("axis_deg = 90", "axis_deg = 0", ["y 0 to 6 mm (foot)"]),
+    ('kind = "leaf"', 'kind = "blade"', ["flexure.kind"]),
+    ("at_mm = [-7.5, 13]", 'at_mm = [-7.5, "l / 2"]', ["no l in [lengths]"]),
+    ("at_mm = [-10, 23]", "at_mm = [-30, 23]", ["probe end"]),
+    ("box_mm = [-10, 10, 20, 26]", "box_mm = [10, -10, 20, 26]", ["body arm.box_mm"]),
+    ("direction = [1, 0]", "direction = [0, 0]", ["drive.direction"]),
+    ('across = "free"', 'across = "loose"', ["drive.across"]),
+    ('across = "free"', 'across = "free"\nforce_n_per_input = 0', ["drive.force_n_per_input"]),
+    ('across = "free"', 'across = "free"\nstiffness_n_mm = -2', ["drive.stiffness_n_mm"]),
+    ('name = "foot"\nbox_mm', 'name = "foot"\nbox', ["body foot.box"]),
+    ("[[probe]]", "[[prob]]", ["did you mean probe?"]),
+    ("plate_mm = 4.0", "plate = 4.0", ["did you mean plate_mm?"]),
+    ("plate_mm = 4.0", "plate_mm = 0.0", ["plate_mm"]),
+    ("poisson_ratio = 0.3", "poisson_ratio = 0.6", ["material.poisson_ratio"]),
+    ("youngs_modulus_mpa = 1000.0", 'youngs_modulus_mpa = "soft"', ["material.youngs_modulus_mpa"]),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "said"), [*(("", text, said) for text, *said in WRONG), *CHANGED])
+def test_a_wrong_drawing_is_one_sentence_with_its_place(tmp_path: Path, old: str, new: str, said: list[str]) -> None:
+    right = HALF + COPIED
+    assert old in HEAD + right
+    path = tmp_path / "mechanism.toml"
+    path.write_text((HEAD + right).replace(old, new, 1) if old else HEAD + right + new)
+    with pytest.raises(FingervisionError) as refused:
+        read_mechanism(path)
+    assert all(part in str(refused.value) for part in said)
+    assert "\n" not in str(refused.value)
 
 
 def test_a_map_keeps_inside_and_outside() -> None:

@@ -5,7 +5,7 @@ import pytest
 import skfem
 from skfem.helpers import dd, ddot, sym_grad, trace
 
-from fingervision.models.flexure import stretched_share, strip_share
+from fingervision.models.flexure import Flexure, stretched_share, strip_share
 
 NU = 0.34
 MORLEY = 0.04
@@ -45,6 +45,18 @@ def test_the_share_is_that_of_a_clamped_plate(width: float) -> None:
         bar = width * (1.0 if place == 0 else 1.0 / 3.0)
         stiffness = (bar + load @ moved) / (bar * (1.0 - NU**2))
         assert strip_share(width, NU)[place] == pytest.approx((1.0 - 1.0 / stiffness) / NU**2, abs=MORLEY)
+
+
+@pytest.mark.parametrize(
+    ("length", "plate", "share"),
+    [(10, 1, 0.020), (10, 2, 0.067), (10, 4, 0.205), (25, 2.5, 0.041), (25, 5, 0.119), (25, 10, 0.283), (20, 6, 0.188)],
+)
+def test_a_strip_that_is_not_thin_is_held_less(length: float, plate: float, share: float) -> None:
+    """Lengths and widths in thicknesses; shares from the force of a lever on the strip, by wedge elements of CalculiX
+    beside plane stress (`tests/benchmarks/solid_reference.py`, nu = 0.35).
+    """
+    strip = Flexure("", "strip", (0.0, 0.0), 0.0, 1.0, 0.5 * length, used=(0.98, 0.02, 0.0))
+    assert strip.width_share(plate) == pytest.approx(share, abs=0.03)
 
 
 @pytest.mark.parametrize("width", [0.3, 1.0, 4.0])
