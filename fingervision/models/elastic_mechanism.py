@@ -7,6 +7,7 @@ state at an input, the natural modes and the reduction to modes follow from thes
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from fingervision.domain.gripper import PointMm
 from fingervision.domain.made_again import MadeAgain
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_bodies import BodyPose
+from fingervision.models.mechanism_bodies import BodyPose, LinkBody, bodies_of
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, MechanismEquilibrium
 from fingervision.models.modal_model import FreeModes, ModalModel, Observable
 
@@ -168,12 +169,18 @@ class ElasticMechanism(MadeAgain, ABC):
     def driven(self) -> DrivenMechanism:
         """The mechanism as a system whose equilibria can be computed."""
 
-    @abstractmethod
+    @cached_property
+    def bodies(self) -> tuple[LinkBody, ...]:
+        """The bodies that the flexures join."""
+        return bodies_of(self.mechanism)
+
     def vibrating(self, count: int) -> DrivenMechanism:
         """Return the mechanism as a system with masses, whose first `count` modes can be computed.
 
-        Its first unknowns are those of `driven`.
+        Its first unknowns are those of `driven`, which may have all masses.
         """
+        del count
+        return self.driven
 
     @property
     @abstractmethod
@@ -204,6 +211,21 @@ class ElasticMechanism(MadeAgain, ABC):
     @abstractmethod
     def mode_lines(self) -> tuple[Array, NDArray[np.int64]]:
         """Lines to plot, shape (n, 2, 2), and the indices of their ends' motions (x and y) in a mode shape."""
+
+    @property
+    @abstractmethod
+    def _errors(self) -> tuple[float, float]:
+        """Relative errors of force and stress."""
+
+    @property
+    def force_error(self) -> float:
+        """Relative error of the force."""
+        return self._errors[0]
+
+    @property
+    def stress_error(self) -> float:
+        """Relative error of the stress in the flexures."""
+        return self._errors[1]
 
     @property
     def stiffness_n_mm(self) -> float:

@@ -22,11 +22,12 @@ from fingervision.domain.gripper import Gripper, PointMm
 from fingervision.models.answer_figures import LINEAR, ModelFigures, Physics
 from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStress, changes
 from fingervision.models.flexure_span import used_in_plate
+from fingervision.models.flexure_stress import BESIDE_CORNER
 from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.gripper_model import DrawnGripper, ModelErrors
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Mechanism, check_mechanism
-from fingervision.models.mechanism_bodies import BodyPose, LinkBody, bodies_of, plate_poses
+from fingervision.models.mechanism_bodies import BodyPose, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism
 from fingervision.models.mechanism_faces import (
     ContactPair,
@@ -56,9 +57,6 @@ _STRESS_ERROR = 0.01
 (`tests/benchmarks/models_held_out.py`)."""
 _BUCKLING = 4
 """Number of buckling inputs nearest to rest that are sought on both sides together."""
-_BESIDE_CORNER = 0.5
-"""Distance from a sharp corner, in thicknesses of the thinnest flexure, within which stress is left out, because it
-depends on the mesh there."""
 
 
 class MechanismPlate(ElasticMechanism):
@@ -95,7 +93,8 @@ class MechanismPlate(ElasticMechanism):
         zones = self._hold_back()
         middles = self.mesh.nodes_mm[:, self.mesh.triangles[:3]].mean(axis=1)
         inside = [zone.holds(middles) for zone in zones] or [np.ones(middles.shape[1], dtype=bool)]
-        self._in_flexure = np.any(inside, axis=0) & ~self._beside_sharp_corners(region, middles)
+        corners_mm = self.plate.nodes_mm[:, self.plate.corner_triangles]
+        self._in_flexure = np.any(inside, axis=0) & ~self._beside_sharp_corners(region, corners_mm)
         corners = [] if mechanism.flexures else sharp_corners_mm(region)
         self.unstated_stress_at_mm = (float(corners[0][0]), float(corners[0][1])) if corners else None
         self._support()
@@ -118,8 +117,8 @@ class MechanismPlate(ElasticMechanism):
     def _beside_sharp_corners(self, region: PlanarRegion, points: Array) -> NDArray[np.bool_]:
         """Points within half a thickness of a sharp re-entrant corner, where the elastic stress is singular."""
         flexures = self.mechanism.flexures
-        near_mm = _BESIDE_CORNER * min((flexure.thickness_mm for flexure in flexures), default=0.0)
-        beside = np.zeros(points.shape[1], dtype=bool)
+        near_mm = BESIDE_CORNER * min((flexure.thickness_mm for flexure in flexures), default=0.0)
+        beside = np.zeros(points.shape[1:], dtype=bool)
         for corner in sharp_corners_mm(region):
             beside |= np.hypot(points[0] - corner[0], points[1] - corner[1]) < near_mm
         return beside
@@ -212,35 +211,14 @@ class MechanismPlate(ElasticMechanism):
         """Nodes of every contact's face, shape (2, k) each."""
         return tuple(self.plate.nodes_mm[:, pair.nodes] for pair in self._pairs)
 
-    def vibrating(self, count: int) -> DrivenMechanism:
-        """Return the same system as `driven`, which has all masses."""
-        del count
-        return self.driven
-
     @cached_property
     def swaying(self) -> "MechanismPlate":
         """The half of a mirrored drawing whose other half moves the same way sideways."""
         return MechanismPlate(self.mechanism.swaying, width_effect=self._width_effect, mesh=self.mesh)
 
     @property
-    def unit_displacement_mm(self) -> Array:
-        """Small displacements per 1 mm of input."""
-        return self.driven.unit_displacement
-
-    @property
-    def force_error(self) -> float:
-        """Relative error of the force, from the mesh and the width effect."""
-        return 0.005 + self.mechanism.width_error
-
-    @property
-    def stress_error(self) -> float:
-        """Relative error of the stress in the flexures, from the mesh."""
-        return _STRESS_ERROR
-
-    @cached_property
-    def bodies(self) -> tuple[LinkBody, ...]:
-        """The bodies that the flexures join."""
-        return bodies_of(self.mechanism)
+    def _errors(self) -> tuple[float, float]:
+        return _FORCE_ERROR + self.mechanism.width_error, _STRESS_ERROR + self.mechanism.stress_error
 
     def drawn_poses(self, moved: Array, *, large: bool) -> Mapping[str, BodyPose]:
         """Poses of the drawn bodies."""

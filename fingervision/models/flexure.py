@@ -153,6 +153,10 @@ _THIN = 0.26
 """Rate at which the restraint of a strip by its width approaches that of a thin plate as the ratio b / t of width to
 thickness grows: wedge elements of CalculiX give 0.24, 0.43, 0.70 and 0.9 of it at b / t = 1, 2, 4 and 10
 (`tests/models/test_strip_width.py`)."""
+_SHARP = 3.0
+"""Power of a strip's share of plane strain that gives its largest von Mises stress, beside sharp roots: the middle of
+the width is held and carries more than the mean, so that only wide strips are stressed less than a narrow bar. Within
+3 % of wedge elements of CalculiX for shares of 0.04 to 0.8 (`tests/benchmarks/models_three_dimensions.py`)."""
 _LEAST_SINE = 0.1
 """Least sine of the angle between two leaves that cross; others lie on each other."""
 _POISSON = 0.34
@@ -277,6 +281,13 @@ class Flexure:
         bent, swayed = self._shares(plate_mm)
         return 0.5 * (swayed - bent)
 
+    def width_range(self, plate_mm: float) -> float:
+        """Largest difference between the weight that the models use and that for another load, such as tension."""
+        others = (
+            (0.0,) if self.is_notch else (*self._shares(plate_mm), stretched_share(plate_mm / self.bent_mm, _POISSON))
+        )
+        return float(np.abs(np.array(others) - self.zone(plate_mm).share).max())
+
     def _shares(self, plate_mm: float) -> tuple[float, float]:
         """Weights of `strip_share`, reduced where the bodies yield as the thick strip warps."""
         held = 1.0 - exp(-_THIN * plate_mm / self.thickness_mm)
@@ -301,7 +312,8 @@ class Flexure:
             stretched = stretched_share(plate_mm / self.bent_mm, _POISSON)
             share += self.used[2] * (stretched - share)
         height = 0.5 * self.thickness_mm + self.depth_mm
-        return ConstrainedZone(self.at_mm, self.axis_deg, self.half_length_mm, height, share)
+        stressed = share if self.is_notch or self.fillet_mm else share**_SHARP
+        return ConstrainedZone(self.at_mm, self.axis_deg, self.half_length_mm, height, share, stressed)
 
 
 def fused(flexures: Sequence[Flexure]) -> tuple[tuple[Flexure, ...], tuple[tuple[str, str, PointMm], ...]]:

@@ -73,6 +73,9 @@ def notch_factors(notch: Notch) -> tuple[float, float]:
     return tension, 4.0 * ratio * root / (3.0 * (root + (ratio - 1.0) * angle))
 
 
+BESIDE_CORNER = 0.5
+"""Distance from a sharp corner, in thicknesses of the thinnest flexure, within which stress is left out: there it is
+singular."""
 _SAMPLES = 401
 
 
@@ -82,7 +85,7 @@ def nominal_stress(
 ) -> LargestStress:  # fmt: skip
     """Find the largest stress |N| / (b h) + 6 |M| / (b h^2) over the free length of a flexure.
 
-    It is on the side of the section where tension and bending stresses add.
+    It is on the side of the section where tension and bending stresses add, and half a thickness from sharp roots.
 
     Parameters
     ----------
@@ -104,7 +107,9 @@ def nominal_stress(
     stations = span.stations_mm(plate_mm) if stations_mm is None else stations_mm
     at_ends = np.concatenate([-end_loads[:, 1], end_loads[-1:, 2]])
     # The moment of a beam is linear between the ends of its segments, and is extrapolated linearly to its roots.
-    x = np.linspace(*span.free_mm, _SAMPLES)
+    low, high = span.free_mm
+    beside = 0.0 if span.flexure.is_notch or span.flexure.fillet_mm else BESIDE_CORNER * span.flexure.thickness_mm
+    x = np.linspace(low + beside, high - beside, _SAMPLES)
     moment = np.interp(x, stations, at_ends)
     for beyond, (i, j) in ((x < stations[0], (0, 1)), (x > stations[-1], (-2, -1))):
         slope = (at_ends[j] - at_ends[i]) / (stations[j] - stations[i])
@@ -115,7 +120,7 @@ def nominal_stress(
     held = 1.0
     if theory is HingeTheory.CORRECTED:
         factors = _factors(span, plate_mm)
-        share = span.flexure.width_share(plate_mm) if width_effect else 0.0
+        share = span.flexure.zone(plate_mm).stressed if width_effect else 0.0
         across = share * mechanism.material.poisson_ratio
         held = float(np.sqrt(1.0 - across + across**2))
     stress = factors[0] * np.abs(tension) / (plate_mm * height)

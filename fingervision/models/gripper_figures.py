@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from math import copysign, exp, isfinite, log
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper, Material, SNLine
-from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress, Physics
+from fingervision.models.answer_figures import LoadedState, ModelFigures
 from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import mechanical_advantage
@@ -24,30 +24,15 @@ _REFINEMENTS = 3
 _PLACES = 9
 
 
-class StressedModel(Protocol):
-    """Protocol of a model that computes the stress in its hinges."""
-
-    physics: Physics
-
-    def peak_stress(self) -> PeakStress:
-        """Largest stress per 1 mm of input, small displacements."""
-        ...
-
-    def loaded(self, inputs_mm: Sequence[float]) -> list[LoadedState]:
-        """Gap, forces and largest stress at the given inputs (mm)."""
-        ...
-
-
-def opening_at_yield_mm(model: StressedModel, yield_mpa: float) -> float:
+def opening_at_yield_mm(model: Any, yield_mpa: float) -> float:
     """Input, on the side where the fingers do not touch, at which the largest stress reaches yield (mm)."""
-    travel_mm = yield_mpa / model.peak_stress().mpa_per_mm
-    if model.physics.large_rotation:
-        for _ in range(_REFINEMENTS):
-            travel_mm *= yield_mpa / model.loaded([travel_mm])[0].stress_mpa
+    travel_mm = float(yield_mpa / model.peak_stress().mpa_per_mm)
+    for _ in range(_REFINEMENTS if model.physics.large_rotation else 0):
+        travel_mm *= yield_mpa / model.loaded([travel_mm])[0].stress_mpa
     return travel_mm
 
 
-def input_at_yield_mm(model: StressedModel, end_mm: float, yield_mpa: float) -> float:
+def input_at_yield_mm(model: Any, end_mm: float, yield_mpa: float) -> float:
     """Input between zero and an end of the range at which the largest stress reaches the yield stress (mm)."""
     if not model.physics.large_rotation and not (model.physics.contact and end_mm < 0.0):
         return float(np.copysign(yield_mpa / model.peak_stress().mpa_per_mm, end_mm))

@@ -69,11 +69,6 @@ class Notch:
                 raise DataError(f"A notch's {name} must be positive, but is {value:g}.")
 
     @property
-    def is_circular(self) -> bool:
-        """Whether the closed formulas of circular notches apply."""
-        return self.half_length_mm == self.depth_mm
-
-    @property
     def curvature_ratio(self) -> float:
         """Thickness over radius of curvature of the neck: R of a circle, a^2 / c of an ellipse with half axes a, c."""
         return self.thickness_mm * self.depth_mm / self.half_length_mm**2
@@ -114,11 +109,6 @@ class Notch:
         """Height t + 2 c (1 - sqrt(1 - x^2 / a^2)), with thickness t and half axes a (along) and c (across)."""
         along = np.clip(1.0 - (x_mm / self.half_length_mm) ** 2, 0.0, 1.0)
         return np.asarray(self.thickness_mm + 2.0 * self.depth_mm * (1.0 - np.sqrt(along)))
-
-
-def circular_notch(radius_mm: float, thickness_mm: float, plate_mm: float) -> Notch:
-    """A notch cut by two discs."""
-    return Notch(thickness_mm, radius_mm, radius_mm, plate_mm)
 
 
 def notches_of(gripper: Gripper) -> tuple[Notch, Notch]:

@@ -23,7 +23,7 @@ from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.gripper_model import DrawnGripper, ModelErrors
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.mechanism import Mechanism, check_mechanism
-from fingervision.models.mechanism_bodies import BodyPose, LinkBody, bodies_of, plate_poses
+from fingervision.models.mechanism_bodies import BodyPose, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
 from fingervision.models.mechanism_faces import (
     ContactNodes,
@@ -283,18 +283,8 @@ class MechanismFrame(ElasticMechanism):
                 stress = max(stress, _STRESS_MISUSED * sqrt(ratio) * part / max(whole, _TINIEST))
             elif span.flexure.kind == "strip" and span.flexure.fillet_mm:
                 stress = max(stress, _STRESS_ONE_SIDED)
-        force = _FORCE_ERROR + self.mechanism.width_error
+        force, stress = _FORCE_ERROR + self.mechanism.width_error, stress + self.mechanism.stress_error
         return force + _FORCE_MISUSED * misused / max(every, _TINIEST), _STRESS_ERROR + stress
-
-    @property
-    def force_error(self) -> float:
-        """Relative error of the force, from the hinge tables, the width effect, and energy outside bending."""
-        return self._errors[0]
-
-    @property
-    def stress_error(self) -> float:
-        """Relative error of the stress in the flexures."""
-        return self._errors[1]
 
     def _end_loads(self, moved: Array, *, large: bool) -> Array:
         """Tension and end moments of all segments of the flexures.
@@ -330,11 +320,6 @@ class MechanismFrame(ElasticMechanism):
         moved = np.zeros(system.unknowns)
         moved[0 : self.frame.unknowns : 3], moved[1 : self.frame.unknowns : 3] = direction
         return moved
-
-    @cached_property
-    def bodies(self) -> tuple[LinkBody, ...]:
-        """The bodies that the flexures join."""
-        return bodies_of(self.mechanism)
 
     def _field(self, moved: Array, *, large: bool) -> Array:
         """Displacement of every node of the bodies; small displacements may include the bodies' own modes."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import hypot, pi
+from math import hypot, pi, sqrt
 from typing import Literal
 
 import numpy as np
@@ -17,6 +17,9 @@ from fingervision.models.width_effect import force_uncertainty
 
 _SIZES_MM = (0.3, 5000.0)
 """Sizes of flexure mechanisms, from etched silicon to large machines: drawings in metres or micrometres lie outside."""
+_OVER_DEPTH = 0.02
+"""Variation of the stress over the plate's depth beside that by restraint, from wedge elements of CalculiX
+(`tests/benchmarks/models_three_dimensions.py`)."""
 _MOST_NAMED = 3
 """Pieces of a drawing that a message names."""
 _SAME_AREA = 1e-2
@@ -219,6 +222,21 @@ class Mechanism:
         """Relative uncertainty of the force because the restraint of the flexures by the plate's width is uncertain."""
         doubt = max((flexure.width_doubt(self.plate_mm) for flexure in self.flexures), default=0.0)
         return 2.0 * force_uncertainty(self.material) + self.material.poisson_ratio**2 * doubt
+
+    @property
+    def stress_error(self) -> float:
+        """Relative uncertainty of the stress, because it varies over the plate's depth: plane models know the mean.
+
+        Where it is largest, the restraint by the width may be absent that makes the von Mises stress smaller.
+        """
+        across = self.material.poisson_ratio * max((f.zone(self.plate_mm).stressed for f in self.flexures), default=0.0)
+        return _OVER_DEPTH + 1.0 - sqrt(1.0 - across + across**2)
+
+    @property
+    def mode_error(self) -> float:
+        """Relative uncertainty of frequencies, because modes may load the strips otherwise than the input does."""
+        apart = max((flexure.width_range(self.plate_mm) for flexure in self.flexures), default=0.0)
+        return 0.5 * self.material.poisson_ratio**2 * apart
 
     @property
     def region(self) -> PlanarRegion:

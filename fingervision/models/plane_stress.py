@@ -118,7 +118,7 @@ class PlaneStressPlate:
         self.plate_mm = plate_mm
         self._located: dict[tuple[float, float], tuple[Indices, Array]] = {}
         middles = mesh.nodes_mm[:, mesh.triangles[:3]].mean(axis=1)
-        self._share = shares_at(zones, middles)[:, None]
+        self._share, self._stressed = shares_at(zones, middles)[:, :, None]
         self._moduli = held_moduli(material, self._share)
         self._mesh = skfem.MeshTri2(mesh.nodes_mm, mesh.triangles)
         self._element = skfem.ElementVector(skfem.ElementTriP2())
@@ -324,7 +324,7 @@ class PlaneStressPlate:
         else:
             stress = _stress(_symmetric(gradient), self._moduli)
         sx, sy, txy = stress[0, 0], stress[1, 1], stress[0, 1]
-        sz = self._share * self.material.poisson_ratio * (sx + sy)
+        sz = self._stressed * self.material.poisson_ratio * (sx + sy)
         squares = (sx - sy) ** 2 + (sy - sz) ** 2 + (sz - sx) ** 2
         return np.asarray(np.sqrt(0.5 * squares + 3.0 * txy**2)).T
 

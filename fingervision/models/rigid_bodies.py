@@ -23,7 +23,7 @@ from fingervision.models.flexure_stress import nominal_stress
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Face, Mechanism, check_mechanism
-from fingervision.models.mechanism_bodies import MRAD, BodyPose, LinkBody, bodies_of
+from fingervision.models.mechanism_bodies import MRAD, BodyPose
 from fingervision.models.mechanism_equilibrium import DrivenMechanism
 from fingervision.models.mechanism_faces import driven_components, per_input_of, with_actuators
 
@@ -59,7 +59,6 @@ class RigidBodies(ElasticMechanism):
         self.theory, region = theory, mechanism.region
         check_mechanism(mechanism, region)
         self._size_mm = region.size_mm
-        self.bodies: tuple[LinkBody, ...] = bodies_of(mechanism)
         spans = [span_of(flexure, region) for flexure in mechanism.flexures]
         self._joins = [self._joined(span) for span in spans]
         # Bodies are rigid, so that a leaf bends over its whole free length.
@@ -197,18 +196,9 @@ class RigidBodies(ElasticMechanism):
             )
         return found
 
-    @property
-    def force_error(self) -> float:
-        """Relative error of the force from treating bodies as rigid, by comparison with the lumped model."""
-        return self._errors[0]
-
-    @property
-    def stress_error(self) -> float:
-        """Relative error of the stress from treating bodies as rigid, by comparison with the lumped model."""
-        return self._errors[1]
-
     @cached_property
     def _errors(self) -> tuple[float, float]:
+        """Errors from treating bodies as rigid, by comparison with the lumped model."""
         elastic = MechanismFrame(self.mechanism, theory=self.theory)
         force = abs(self.stiffness_n_mm / elastic.stiffness_n_mm - 1.0)
         stress = abs(self.state(1.0).stress_mpa / elastic.state(1.0).stress_mpa - 1.0)
@@ -230,11 +220,6 @@ class RigidBodies(ElasticMechanism):
 
     def _no_mass(self) -> csr_matrix:
         raise ModelError("The stiffness-matrix model has no masses; take --kind lumped or finite_element.")
-
-    def vibrating(self, count: int) -> DrivenMechanism:
-        """Refuse, because this model has no masses."""
-        del count
-        return replace(self.driven, mass=self._no_mass)
 
     @property
     def swaying(self) -> "RigidBodies":

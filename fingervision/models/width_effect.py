@@ -34,8 +34,9 @@ class ConstrainedZone:
         Angle of the flexure's axis from x.
     half_length_mm, half_height_mm : float
         Half extents along the axis and across it.
-    share : float
-        Share of plane strain: 0 for plane stress, 1 for plane strain.
+    share, stressed : float
+        Share of plane strain, 0 for plane stress and 1 for plane strain: in the stiffness, and in the largest von Mises
+        stress over the plate's depth.
     """
 
     centre_mm: PointMm
@@ -43,6 +44,7 @@ class ConstrainedZone:
     half_length_mm: float
     half_height_mm: float
     share: float
+    stressed: float
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
         """Whether points, shape (2, n), lie in the zone."""
@@ -54,11 +56,12 @@ class ConstrainedZone:
 
 
 def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:
-    """Weight w of plane strain at given points, shape (2, n); 0 outside the zones."""
-    share = np.zeros(points.shape[1])
+    """Shares of plane strain in stiffness and stress at given points, shape (2, n); 0 outside the zones."""
+    shares = np.zeros((2, points.shape[1]))
     for zone in zones:
-        share = np.where(zone.holds(points), np.maximum(share, zone.share), share)
-    return share
+        own = np.array([[zone.share], [zone.stressed]])
+        shares = np.where(zone.holds(points), np.maximum(shares, own), shares)
+    return shares
 
 
 def held_moduli(material: Material, share: Array) -> tuple[Array, Array]:

@@ -82,7 +82,7 @@ def hidden(kinds: Sequence[str], rng: np.random.Generator) -> Hidden:
         flexures = [other if place == hinge else own for place, own in enumerate(mechanism.flexures)]
         mechanism = replace(mechanism, flexures=tuple(flexures))
     model = MechanismPlate(mechanism)
-    small, bend = model.unit_displacement_mm, beside_small(model)
+    small, bend = model.driven.unit_displacement, beside_small(model)
     load, stiffness, by_slip = slips(play[0], model) if play is not None else (np.zeros(2), np.eye(2), np.zeros((1, 2)))
 
     def moved_at(u: float) -> Array:
@@ -113,7 +113,7 @@ def slips(number: int, model: MechanismPlate) -> tuple[Array, Array, Array]:
 def bent() -> tuple[Delaunay, Array, dict[str, float]]:
     """What large rotations add to the sample as drawn, per mm of input: shape (nodes, 2 NODES); and turns of bodies."""
     model = MechanismPlate(drawn())
-    states = [model.state(u, large_rotation=True).displacement_mm / u - model.unit_displacement_mm for u in NODES]
+    states = [model.state(u, large_rotation=True).displacement_mm / u - model.driven.unit_displacement for u in NODES]
     plate = model.plate
     added = np.array([own[dofs] for dofs in (plate.x_dofs, plate.y_dofs) for own in states]).T
     return Delaunay(plate.nodes_mm.T), added, turns_of(model)
@@ -121,7 +121,7 @@ def bent() -> tuple[Delaunay, Array, dict[str, float]]:
 
 def turns_of(model: MechanismPlate) -> dict[str, float]:
     """Turn of every body by 1 mm of input, small displacements."""
-    poses = plate_poses(model.plate, model.bodies, model.unit_displacement_mm, large=False)
+    poses = plate_poses(model.plate, model.bodies, model.driven.unit_displacement, large=False)
     return {name: pose.angle_mrad for name, pose in poses.items()}
 
 

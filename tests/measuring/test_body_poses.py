@@ -36,7 +36,7 @@ def frame(
     plate: MechanismPlate, u: float, number: int, place: Placement = PLACE, cover: tuple[Patch, ...] = ()
 ) -> Frame:
     rng = np.random.default_rng(number)
-    moved = u * plate.unit_displacement_mm
+    moved = u * plate.driven.unit_displacement
     nodes = plate.plate.nodes_mm + np.stack([moved[plate.plate.x_dofs], moved[plate.plate.y_dofs]])
     outlines = deformed_outlines(plate.plate.outline_edges, place.to_px(nodes))
     scene = Scene(width_px=WIDTH, height_px=HEIGHT, before=(Patch(outlines, 50.0), *cover))

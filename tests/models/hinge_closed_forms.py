@@ -11,6 +11,11 @@ from fingervision.domain.gripper import Material
 from fingervision.models.hinge_correction import Notch
 
 
+def circular_notch(radius_mm: float, thickness_mm: float, plate_mm: float) -> Notch:
+    """A notch cut by two discs."""
+    return Notch(thickness_mm, radius_mm, radius_mm, plate_mm)
+
+
 def paros_weisbord_bending(notch: Notch, material: Material) -> float:
     """Rotation per moment about z in rad/(N mm), in full: Paros and Weisbord, Machine Design 37 (1965) 151.
 
@@ -47,7 +52,7 @@ def wu_zhou_axial(notch: Notch, material: Material) -> float:
 
 
 def _radius_mm(notch: Notch) -> float:
-    if not notch.is_circular:
+    if notch.half_length_mm != notch.depth_mm:
         raise FingervisionError(
             f"This closed form is that of a circular notch, but the half axes are {notch.half_length_mm:g} and "
             f"{notch.depth_mm:g} mm; take the compliance by quadrature."

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingervision.domain.gripper import Material
-from fingervision.models.hinge_correction import Notch, beam_compliance, circular_notch, masses_t, planes_ratio
+from fingervision.models.hinge_correction import Notch, beam_compliance, masses_t, planes_ratio
 from tests.benchmarks.hinge_solid import plane_compliance, solid_compliance
 from tests.models import hinge_closed_forms as closed
 
@@ -45,7 +45,7 @@ def corrected(notch: Notch) -> np.ndarray:
 
 @given(ratio=ratios)
 def test_the_closed_forms_of_beam_theory_are_one_integral(ratio: float) -> None:
-    notch = circular_notch(4.0, 4.0 * ratio, 3.0)
+    notch = closed.circular_notch(4.0, 4.0 * ratio, 3.0)
     beam = beam_compliance(notch, PA2200)
     assert closed.paros_weisbord_bending(notch, PA2200) == pytest.approx(beam[2, 2], rel=QUADRATURE)
     assert closed.wu_zhou_bending(notch, PA2200) == pytest.approx(beam[2, 2], rel=QUADRATURE)
@@ -54,8 +54,8 @@ def test_the_closed_forms_of_beam_theory_are_one_integral(ratio: float) -> None:
 
 @given(ratio=ratios, scale=st.floats(0.01, 100.0))
 def test_compliance_scales_with_size_by_dimension(ratio: float, scale: float) -> None:
-    small = beam_compliance(circular_notch(1.0, ratio, 1.0), PA2200)
-    large = beam_compliance(circular_notch(scale, scale * ratio, scale), PA2200)
+    small = beam_compliance(closed.circular_notch(1.0, ratio, 1.0), PA2200)
+    large = beam_compliance(closed.circular_notch(scale, scale * ratio, scale), PA2200)
     power = np.array([1, 1, 2])
     assert large * np.outer(scale ** (power - 1.0), scale ** (power - 1.0)) * scale == pytest.approx(small, rel=1e-9)
 
@@ -69,27 +69,27 @@ def test_corrected_compliance_is_symmetric_and_passive(ratio: float, depth: floa
 
 @pytest.mark.parametrize("ratio", RIGID_ENDS)
 def test_errors_of_beam_theory_between_rigid_ends(ratio: float) -> None:
-    notch = circular_notch(1.0, ratio, 1.0)
+    notch = closed.circular_notch(1.0, ratio, 1.0)
     beam = np.diag(beam_compliance(notch, PA2200))
     errors = 100.0 * (beam / np.diag(plane_compliance(notch, PA2200)) - 1.0)
     assert errors == pytest.approx(RIGID_ENDS[ratio], abs=POINTS)
 
 
 def test_corrected_hinge_is_that_of_the_bricks() -> None:
-    ours = corrected(circular_notch(4.0, 1.0, 3.0))
+    ours = corrected(closed.circular_notch(4.0, 1.0, 3.0))
     assert {place: ours[place] for place in BRICKS} == pytest.approx(BRICKS, rel=ENTRY)
 
 
 @pytest.mark.slow
 def test_the_bricks_are_those_of_the_table() -> None:
-    bricks = solid_compliance(circular_notch(4.0, 1.0, 3.0), PA2200)[PLANAR]
+    bricks = solid_compliance(closed.circular_notch(4.0, 1.0, 3.0), PA2200)[PLANAR]
     assert {place: bricks[place] for place in BRICKS} == pytest.approx(BRICKS, rel=ENTRY)
 
 
 @settings(max_examples=20)
 @given(segments=st.integers(1, 40), ratio=ratios)
 def test_segment_masses_add_up_to_the_notch(segments: int, ratio: float) -> None:
-    notch = circular_notch(1.0, ratio, 1.0)
+    notch = closed.circular_notch(1.0, ratio, 1.0)
     area = 2.0 * (ratio + 2.0) - np.pi
     masses = masses_t(notch, PA2200, np.linspace(-notch.reach_mm, notch.reach_mm, segments + 1))
     assert masses.sum() == pytest.approx(PA2200.density_t_mm3 * area, rel=1e-12)

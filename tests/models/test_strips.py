@@ -70,6 +70,23 @@ def test_a_strip_between_two_slots_is_the_leaf_that_it_is(tmp_path: Path) -> Non
         assert ours.state(1.0).stress_mpa == pytest.approx(theirs.state(1.0).stress_mpa, rel=0.02)
 
 
+@pytest.mark.parametrize(("turns", "stress_mpa"), [("held", 10.78), ("free", 1.227)])
+def test_the_stress_beside_sharp_roots_is_within_its_stated_error(
+    tmp_path: Path, turns: str, stress_mpa: float
+) -> None:
+    """Largest von Mises stress at any depth, half a thickness from the roots and beyond, by wedge elements of
+    CalculiX.
+    """
+    text = HEAD.replace("0.34", "0.35") + f'across = "free"\nturns = "{turns}"\n' + NAMED
+    path = tmp_path / "mechanism.toml"
+    path.write_text(text.replace("thickness_mm = 1.0", "thickness_mm = 0.4"))
+    mechanism = read_mechanism(path)
+    for kind in (MechanismPlate, MechanismFrame):
+        model = kind(mechanism)
+        assert model.stress_error < 0.08
+        assert model.state(1.0).stress_mpa == pytest.approx(stress_mpa, rel=model.stress_error)
+
+
 def test_the_width_of_a_cut_strip_makes_it_stiffer(tmp_path: Path) -> None:
     """By the plate's energy, a strip as wide as 0.4 of its length is some percent stiffer than a bar."""
     cut = drawn(tmp_path, CUT)

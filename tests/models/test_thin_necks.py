@@ -11,7 +11,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material
 from fingervision.models.finite_element import FiniteElementGripper
 from fingervision.models.gripper_mechanism import redrawn
-from fingervision.models.hinge_correction import HingeTheory, Notch, beam_compliance, circular_notch, planes_ratio
+from fingervision.models.hinge_correction import HingeTheory, Notch, beam_compliance, planes_ratio
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.skeleton import skeleton_of
 from fingervision.models.width_effect import force_uncertainty, held_moduli
@@ -32,7 +32,7 @@ def series(notch: Notch, segments: int) -> float:
 @pytest.mark.parametrize("ratio", [0.0025, 0.01, 0.0125, 0.02, 0.05, 0.25, 1.0])
 @pytest.mark.parametrize("segments", [2, 10])
 def test_segments_sum_to_the_closed_form_however_thin_the_neck(ratio: float, segments: int) -> None:
-    notch = circular_notch(4.0, 4.0 * ratio, 3.0)
+    notch = closed.circular_notch(4.0, 4.0 * ratio, 3.0)
     assert series(notch, segments) == pytest.approx(closed.wu_zhou_bending(notch, PA2200), rel=ROUNDING)
     assert series(notch, segments) == pytest.approx(closed.paros_weisbord_bending(notch, PA2200), rel=ROUNDING)
 
@@ -40,7 +40,8 @@ def test_segments_sum_to_the_closed_form_however_thin_the_neck(ratio: float, seg
 def test_the_frame_of_a_notch_carries_those_segments(gripper: Gripper) -> None:
     thin = replace(gripper, hinge=replace(gripper.hinge, thickness_mm=0.05))
     parts = [m.compliance[2, 2] for m in skeleton_of(thin, HingeTheory.BEAM).members if m.name == "hinge 1"]
-    assert sum(parts) == pytest.approx(closed.wu_zhou_bending(circular_notch(4.0, 0.05, 3.0), PA2200), rel=ROUNDING)
+    notch = closed.circular_notch(4.0, 0.05, 3.0)
+    assert sum(parts) == pytest.approx(closed.wu_zhou_bending(notch, PA2200), rel=ROUNDING)
 
 
 def test_a_notch_that_leaves_its_web_early_is_only_as_long_as_the_web_has_it() -> None:
@@ -66,7 +67,7 @@ def test_a_whole_gripper_with_thin_necks_is_as_soft_as_finite_elements(gripper: 
 def test_the_width_effect_between_the_tables_nodes_and_for_other_materials(nu: float, width: float) -> None:
     """Brick elements at a width and Poisson's ratio that are in no table: bending is within the stated uncertainty."""
     material = replace(PA2200, poisson_ratio=nu)
-    notch = circular_notch(1.0, 0.16, 0.16 * width)
+    notch = closed.circular_notch(1.0, 0.16, 0.16 * width)
     bricks = solid_compliance(notch, material, along=24, across=2, through=4)
     corrected = planes_ratio(notch, material)[2] * beam_compliance(notch, material)[2, 2]
     assert corrected == pytest.approx(bricks[5, 5], rel=COARSE + force_uncertainty(material))
