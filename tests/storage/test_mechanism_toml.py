@@ -165,7 +165,7 @@ def test_a_mechanism_that_nothing_holds_is_refused() -> None:
     loose = STAGE.replace("[[fixed]]", '[[slide]]\nholds = "x"')
     loose = loose.replace("direction = [1.0, 0.0]", "direction = [1.0, 0.0]")
     with pytest.raises(ModelError, match="must be held by its fixed faces, but can move freely"):
-        _ = MechanismPlate(mechanism_from_tables(tomllib.loads(loose), "m.toml")).unit_displacement_mm
+        _ = MechanismPlate(mechanism_from_tables(tomllib.loads(loose), "m.toml")).driven.unit_displacement
 
 
 def test_arithmetic_with_names() -> None:
