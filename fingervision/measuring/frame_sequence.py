@@ -247,15 +247,14 @@ def _is_closed(last: _Seen, frame: Frame) -> bool:
     along_px = finger.y_px if upright else finger.x_px
     first = max(0, round(along_px) - (0 if along_px > finger.tip_px else BAND_PX))
     covered = _is_like(pixels[first : first + BAND_PX], last.gap, last.looks[0].level).mean(axis=0) > 0.5
-    middle = round(0.5 * (last.positions[0][0] + last.positions[1][0]))
-    ground = np.flatnonzero(~covered)
-    before, behind = ground[ground <= middle], ground[ground >= middle]
-    if not before.size or not behind.size:
-        return False
-    seen_px = int(behind[0] - before[-1] - 1)
-    widths_px = [ends[1] - ends[0] for ends in (look.ends_px for look in last.looks)]
     # One finger alone is narrower, and what fills the gap leaves the outer sides where they were.
     unseen_px = max(0.5 * last.gap.gap_px, LEVEL_IN_BLURS * finger.blur_px)
+    ground = np.flatnonzero(~covered) - 0.5 * (last.positions[0][0] + last.positions[1][0])
+    before, behind = ground[ground < -0.5 * unseen_px], ground[ground > 0.5 * unseen_px]
+    if not before.size or not behind.size:
+        return False
+    seen_px = float(behind[0] - before[-1] - 1.0)
+    widths_px = [ends[1] - ends[0] for ends in (look.ends_px for look in last.looks)]
     return 0.5 * (sum(widths_px) + max(widths_px)) < seen_px < sum(widths_px) + unseen_px
 
 
