@@ -1,6 +1,10 @@
 """Recordings as files: frames at their own times, and pictures at an even rate as any program codes them."""
 
-from collections.abc import Iterable, Mapping
+import io
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import count
@@ -38,6 +42,23 @@ def h264(crf: float = 23.0) -> Codec:
 def mjpeg(qscale: int = 3) -> Codec:
     """Motion JPEG of a quantiser scale: 2 is the best, 31 the worst."""
     return Codec("mjpeg", "yuvj420p", {"qmin": str(qscale), "qmax": str(qscale)})
+
+
+@contextmanager
+def opened_to_write(
+    file: str | io.BytesIO, container_format: str | None = None
+) -> Iterator[av.container.OutputContainer]:
+    """Open a container for coding; the priority that a coder takes is given back at the end.
+
+    SVT-AV1 gives real-time priority to the thread that calls it where it may, that is as root: everything else on the
+    machine, the programs that this thread starts excepted, then waits for it until the process ends.
+    """
+    try:
+        with av.open(file, "w", format=container_format) as container:
+            yield container
+    finally:
+        if sys.platform == "linux":
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def write_clip(path: Path, frames: Iterable[Frame], codec: Codec) -> None:
@@ -84,7 +105,7 @@ def coded(
 
     `ranges` are those of `av.VideoFrame.reformat`, by which levels become luma.
     """
-    with av.open(str(path), "w", format=container_format) as container:
+    with opened_to_write(str(path), container_format) as container:
         stream = container.add_stream(codec.name, rate=rate_hz, options=dict(codec.options))
         stream.pix_fmt = codec.pixel_format
         for number, (tick, levels) in enumerate(zip(count() if ticks is None else ticks, pictures, strict=False)):

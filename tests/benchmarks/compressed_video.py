@@ -27,6 +27,7 @@ from fingervision.frames.video_file import VideoFile
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings
 from tests.benchmarks.frame import Namespace, benchmark
 from tests.benchmarks.scores import Scores, percent, rms
+from tests.clips import opened_to_write
 
 Floats = NDArray[np.float64]
 WIDTH, HEIGHT, FRAMES = 640, 480, 16
@@ -136,7 +137,7 @@ def clip(
     truth, buffer, options = [], io.BytesIO(), dict(kind.options)
     if kind.speed[1]:
         options[kind.speed[0]] = str(rng.choice(kind.speed[1]))
-    with av.open(buffer, "w", format=kind.container) as container:
+    with opened_to_write(buffer, kind.container) as container:
         stream = container.add_stream(kind.codec, rate=25, options=options)
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, kind.pix_fmt
         if bit_rate:
