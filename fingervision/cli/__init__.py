@@ -120,7 +120,9 @@ def _of_system(error: Exception) -> str | None:
     """Sentence on an error of the operating system, for which neither the input nor this program is to blame."""
     if isinstance(error, MemoryError):
         return "This needs more memory than the machine has free: close other programs, or choose a smaller input."
-    if isinstance(error, RuntimeError) and "Symlink loop" in str(error):
+    # Python 3.13 passes on the system's error, where older ones raise their own.
+    is_loop = isinstance(error, RuntimeError) and "Symlink loop" in str(error)
+    if is_loop or (isinstance(error, OSError) and error.errno == errno.ELOOP):
         return f"A symbolic link leads back to itself ({error}): name a real file or folder."
     if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
         return "A file name must fit the limits of the operating system, but is too long: shorten it."
