@@ -24,7 +24,7 @@ _REFINEMENTS = 3
 _PLACES = 9
 
 
-def opening_at_yield_mm(model: Any, yield_mpa: float) -> float:
+def opening_at_yield_mm(model: DrawnGripper, yield_mpa: float) -> float:
     """Input, on the side where the fingers do not touch, at which the largest stress reaches yield (mm)."""
     travel_mm = float(yield_mpa / model.peak_stress().mpa_per_mm)
     for _ in range(_REFINEMENTS if model.physics.large_rotation else 0):
@@ -32,7 +32,7 @@ def opening_at_yield_mm(model: Any, yield_mpa: float) -> float:
     return travel_mm
 
 
-def input_at_yield_mm(model: Any, end_mm: float, yield_mpa: float) -> float:
+def input_at_yield_mm(model: DrawnGripper, end_mm: float, yield_mpa: float) -> float:
     """Input between zero and an end of the range at which the largest stress reaches the yield stress (mm)."""
     if not model.physics.large_rotation and not (model.physics.contact and end_mm < 0.0):
         return float(np.copysign(yield_mpa / model.peak_stress().mpa_per_mm, end_mm))

@@ -124,6 +124,12 @@ def mesh_of(gripper: Gripper) -> PlaneMesh:
         return PlaneMesh(stored["nodes_mm"], stored["triangles"].astype(np.int64))
 
 
+def write_reference_mesh(gripper: Gripper, path: str) -> None:
+    """Regenerate the packaged mesh from the reference gripper."""
+    mesh = mesh_outline(gripper, working_size(gripper))
+    np.savez_compressed(path, nodes_mm=mesh.nodes_mm, triangles=mesh.triangles.astype(np.int32))
+
+
 # Table 1 of Hricko & Havlik (2015): the two published models and the only measurement of the real gripper.
 #
 # Source: American Journal of Mechanical Engineering 3(6), 2015, 201-206, table 1, with the digits as printed. No
