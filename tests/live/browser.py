@@ -24,8 +24,9 @@ QUIET = [
     "--disable-component-update",
     "--disable-sync",
 ]
-# What the browser itself says of a server that is not running.
-UNREACHABLE = "WebSocket connection to"
+# What the browser itself says of a server that is not running: a test may end its server while the page still asks for
+# the next picture.
+UNREACHABLE = ("WebSocket connection to", "net::ERR_CONNECTION_REFUSED")
 PATIENCE_MS = 120_000
 
 
@@ -43,6 +44,10 @@ def opened(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iter
     """Open pages, record their requests and errors, keep a screenshot, and refuse requests to other machines."""
     contexts, requests, errors = [], [], []
 
+    def heard(message: Any) -> None:
+        if not any(words in message.text for words in UNREACHABLE):
+            errors.append(f"{message.type}: {message.text}")
+
     def open_page(address: str, **context: Any) -> Any:
         contexts.append(browser.new_context(**context))
         page = contexts[-1].new_page()
@@ -50,9 +55,7 @@ def opened(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iter
         page.on("request", lambda each: requests.append(each.url))
         page.on("websocket", lambda each: requests.append(each.url))
         page.on("pageerror", lambda each: errors.append(str(each)))
-        page.on(
-            "console", lambda each: None if UNREACHABLE in each.text else errors.append(f"{each.type}: {each.text}")
-        )
+        page.on("console", heard)
         page.goto(address)
         return page
 
