@@ -106,8 +106,9 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
             free = [k for k in range(len(raw.columns)) if k not in set(chosen.values())]
             listed = ", ".join(f"'{raw.columns[k].name}'" for k in free[:12]) + (" ..." if len(free) > 12 else "")
             words = f"no column has a usual name for the {role} (the columns are {listed or 'taken'})"
-            found = readings(role, free) or [Reading(f"columns.{role}=NAME", "the table of this file holds none")]
-            about.questions.append(asked(words, found, CANONICAL[role]))
+            key = f"columns.{role}=NAME"  # without readings, no column of this table can answer
+            found = readings(role, free)
+            about.questions.append(Question(words, found[0].key if found else key, CANONICAL[role], tuple(found)))
     return chosen
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.errors import DataError
 from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.body_channels import BodyChannels, channels_in
-from fingervision.tables.column_choice import NEEDED, Findings, choose
+from fingervision.tables.column_choice import CANONICAL, NEEDED, Findings, choose
 from fingervision.tables.dialect import MISSING, NO_NUMBER, to_numbers
 from fingervision.tables.doubts import (
     doubts,
@@ -135,10 +136,25 @@ class Understood:
         ------
         OpenQuestionError
             There is an open question.
+        DataError
+            A required column is missing, and no column of the table can be it.
         """
+        lost = [each.missing for each in self.questions if each.missing and not each.readings]
+        if lost:
+            raise DataError(f"{self.path} must have a column {' and a column '.join(lost)}, but {self._instead(lost)}")
         if self.questions:
             raise OpenQuestionError(self.path, self.kind, self.questions)
         return self
+
+    def _instead(self, lost: list[str]) -> str:
+        """Say what the table is, and what to give instead of it, if required columns cannot be found in it."""
+        roles = {each.role for each in self.taken}
+        if self.kind == "measured" and lost == [CANONICAL["gap"]] and "input" in roles and roles & {"time", "date"}:
+            return (
+                "is a log of the drive, which holds no gap: measure the recording of this motion with it (fingervision "
+                f"measure RECORDING --drive {self.path.name}), and give the gaps.csv that this writes."
+            )
+        return "none of its columns can be that: give a table that has it."
 
 
 def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
