@@ -90,6 +90,16 @@ def test_the_page_asks_nobody(answer: Path) -> None:
     assert len(page) < 2_000_000
 
 
+def test_every_chart_of_the_page_has_its_numbers(answer: Path) -> None:
+    page = (answer / "report.html").read_text(encoding="utf-8")
+    held = json.loads(re.findall(r'<script type="application/json" id="figures">(.*?)</script>', page)[0])
+    placed = re.findall(r'<div class="chart" id="([^"]+)"', page)
+    assert [each["id"] for each in held] == placed
+    assert {"gap-input", "residual-time", "effect-backlash-input"} <= set(placed)
+    shown = [value for each in held for series in each["series"] for value in series["values"] if value is not None]
+    assert np.ptp(shown) > 0.0
+
+
 class Elements(HTMLParser):
     """Elements of a page with their attributes, and the text within its scripts."""
 

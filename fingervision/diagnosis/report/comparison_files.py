@@ -14,7 +14,7 @@ from fingervision.diagnosis.report.html_parts import (
     HINT,
     GapCurves,
     bullets,
-    chart,
+    charts_html,
     charts_of,
     gap_curves,
     number,
@@ -82,14 +82,8 @@ def left_out_of(found: Mapping[str, Comparison]) -> tuple[int, ...]:
 
 
 def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, frames: str, title: str) -> str:
-    charts = charts_of(curves, {name: one.residual_mm["gap"] for name, one in found.items()}, left_out_of(found))
-    names = {
-        "gap-input": "Gap over the input, measured and predicted",
-        "gap-time": "Gap over time, measured and predicted",
-        "residual-input": "Measured minus predicted gap over the input",
-        "residual-time": "Measured minus predicted gap over time",
-    }
-    drawn = {str(one["id"]): chart(one, names[str(one["id"])]) for one in charts}
+    residuals = {"gap": {name: one.residual_mm["gap"] for name, one in found.items()}}
+    charts = charts_of(curves, residuals, left_out_of(found))
     rows = [
         [escape(name), number(one.rms_mm), number(one.noise_mm), f"{len(one.places)}"] for name, one in found.items()
     ]
@@ -102,9 +96,8 @@ def _page(found: Mapping[str, Comparison], curves: GapCurves, made: Provenance, 
     )
     first = next(iter(found.values()))
     sections = [
-        ("Gap against input", "".join(html for name, html in drawn.items() if name.startswith("gap"))
-         + f'<p class="hint">{HINT}</p>'),
-        ("Difference", "".join(html for name, html in drawn.items() if name.startswith("residual"))),
+        ("Gap against input", f'{charts_html(charts, "gap-")}<p class="hint">{HINT}</p>'),
+        ("Difference", charts_html(charts, "residual-")),
         ("How much", table(["model", "disagreement, RMS", "random noise, at most", "places beyond the noise"], rows)),
         ("At the turning points", frames),
         ("Where they disagree", places),

@@ -101,6 +101,12 @@ SHOWN_SHARE = 0.2
 
 def effect_figure(name: str) -> Figure:
     """Draw the residual that an effect causes."""
+    residual, history = effect_residual(name)
+    return residual_figure(residual, None, history)
+
+
+def effect_residual(name: str) -> tuple[dict[str, Array], History]:
+    """Residual (mm or N) that an effect causes, by channel, in an ideal linear gripper, and the gripper's motion."""
     effect = catalogue()[name]
     input_mm = np.array([-0.6, 1.6])
     gap_mm = 4.0 + 7.7 * input_mm
@@ -128,13 +134,12 @@ def effect_figure(name: str) -> Figure:
     chain = MeasuringChain(model, history, {})
     bare, with_it = chain.respond({}), chain.respond({name: values})
     if effect.needs_force:
-        return residual_figure({"force": 1.0 * (np.asarray(with_it.force_n) - np.asarray(bare.force_n))}, None, history)
-    residual = {
+        return {"force": 1.0 * (np.asarray(with_it.force_n) - np.asarray(bare.force_n))}, history
+    return {
         "gap": with_it.gap_mm - bare.gap_mm,
         "left": with_it.left_mm - bare.left_mm,
         "right": with_it.right_mm - bare.right_mm,
-    }
-    return residual_figure(residual, None, history)
+    }, history
 
 
 LINES = tuple(zip(COLOURS, ("--", "-", "-.", ":"), strict=True))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.report.left_out_rows import outside_words
 from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR, limit_words
-from fingervision.domain.effect import Array, Flags
+from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.parameter import Estimate
 from fingervision.storage.provenance import Provenance
 
@@ -111,27 +111,53 @@ DASHES: tuple[list[int], ...] = ([6, 4], [], [8, 3, 2, 3], [2, 3])
 Chart = dict[str, object]
 
 
-def charts_of(curves: GapCurves, residual_mm: dict[str, Array], left_out: Sequence[int] = ()) -> list[Chart]:
-    """Compose the charts: gap and residual over the input, and over time if the runs have a common clock.
+def charts_of(
+    curves: GapCurves, residuals: Mapping[str, Mapping[str, Array]], left_out: Sequence[int] = ()
+) -> list[Chart]:
+    """Compose the charts: gap and residuals over the input, and over time if the runs have a common clock.
 
     Parameters
     ----------
     curves : GapCurves
         Measurement and predictions.
-    residual_mm : dict of ndarray of float, shape (n,)
-        Measured minus predicted gap, by the name of the prediction.
+    residuals : mapping of str to mapping of str to ndarray of float, shape (n,)
+        Measured minus predicted values, by channel and by the name of the prediction.
     left_out : sequence of int
         Rows that the figures of the report do not count: drawn grey, and not considered by the scale.
     """
     counts = np.ones(curves.input_mm.size, dtype=bool)
     counts[list(left_out)] = False
-    found = [_gap(curves, "gap-input", curves.input_mm, "input, mm", both_ways=True)]
-    if curves.time_s is not None:
-        found.append(_gap(curves, "gap-time", curves.time_s, "time, s", both_ways=False))
-    found.append(_residuals(residual_mm, "residual-input", curves.input_mm, "input, mm", counts))
-    if curves.time_s is not None:
-        found.append(_residuals(residual_mm, "residual-time", curves.time_s, "time, s", counts))
+    axes = [("input", "the input", "input, mm", curves.input_mm)]
+    axes += [] if curves.time_s is None else [("time", "time", "time, s", curves.time_s)]
+    found = [
+        {"words": f"Gap over {over}, measured and predicted", **_gap(curves, f"gap-{end}", x, label, end == "input")}
+        for end, over, label, x in axes
+    ]
+    for channel, residual in residuals.items():
+        of, unit = "" if channel == "gap" else f"-{channel}", "N" if channel == "force" else "mm"
+        series = {f"measured minus {model}": values for model, values in residual.items()}
+        found += [
+            {
+                "words": f"Measured minus predicted {channel} over {over}",
+                **_residuals(series, f"residual-{end}{of}", (x, label), f"difference of the {channel}, {unit}", counts),
+            }
+            for end, over, label, x in axes
+        ]
     return found
+
+
+def effect_charts(name: str, residual: Mapping[str, Array], history: History) -> list[Chart]:
+    """Charts of what an effect alone does, over the input and over time."""
+    every = np.ones(history.input_mm.size, dtype=bool)
+    what = f"measured minus simulated, {'N' if 'force' in residual else 'mm'}"
+    axes = {"input": (history.input_mm, "input, mm"), "time": (history.clock_s, "time, s")}
+    return [
+        {
+            "words": f"{name} alone, in a simulated gripper that opens and closes, over {end}",
+            **_residuals(residual, f"effect-{name}-{end}", axis, what, every),
+        }
+        for end, axis in axes.items()
+    ]
 
 
 def charts_json(charts: list[Chart]) -> str:
@@ -152,7 +178,7 @@ def _values(values: Array, rows: NDArray[np.intp], where: Flags | None = None) -
     ]  # fmt: skip
 
 
-def _gap(curves: GapCurves, name: str, x: Array, label: str, *, both_ways: bool) -> Chart:
+def _gap(curves: GapCurves, name: str, x: Array, label: str, both_ways: bool) -> Chart:
     rows, thinned = _shown(x)
     ways: dict[str, Flags | None] = {"": None}
     if both_ways and curves.directed:
@@ -173,28 +199,29 @@ def _gap(curves: GapCurves, name: str, x: Array, label: str, *, both_ways: bool)
     return {"id": name, "x": label, "y": f"gap, mm{thinned}", "at": _values(x, rows), "series": series}
 
 
-def _residuals(residual_mm: dict[str, Array], name: str, x: Array, label: str, counts: Flags) -> Chart:
-    rows, thinned = _shown(x)
+def _residuals(residuals: Mapping[str, Array], name: str, axis: tuple[Array, str], what: str, counts: Flags) -> Chart:
+    """Chart of several residuals over an axis: its values and its label."""
+    rows, thinned = _shown(axis[0])
     series: list[dict[str, object]] = [
-        {"label": f"measured minus {model}", "points": True, "filled": number > 0, "colour": 1 + number % 5, "dash": [],
+        {"label": label, "points": True, "filled": number > 0, "colour": 1 + number % 5, "dash": [],
          "values": _values(residual, rows, counts)}
-        for number, (model, residual) in enumerate(residual_mm.items())
+        for number, (label, residual) in enumerate(residuals.items())
     ]  # fmt: skip
     note = ""
     if not counts.all():
-        last = list(residual_mm.values())[-1]
+        last = list(residuals.values())[-1]
         series.append(
             {"label": "left out", "points": True, "filled": False, "colour": 0, "dash": [], "aside": True,
              "values": _values(last, rows, ~counts)}
         )  # fmt: skip
-        shown = np.concatenate([residual[counts] for residual in residual_mm.values()])
+        shown = np.concatenate([residual[counts] for residual in residuals.values()])
         note = outside_words(last[~counts], *(float(end(shown)) for end in (np.min, np.max))) if shown.size else ""
     return {
         "note": note,
         "id": name,
-        "x": label,
-        "y": f"difference of the gap, mm{thinned}",
-        "at": _values(x, rows),
+        "x": axis[1],
+        "y": f"{what}{thinned}",
+        "at": _values(axis[0], rows),
         "series": series,
     }
 
@@ -241,13 +268,17 @@ def with_uncertainty(e: Estimate) -> list[str]:
     return [value, f"{COVERAGE_FACTOR * e.u:.{places}f} {escape(e.unit)}".rstrip()]
 
 
-def chart(found: Chart, words: str) -> str:
-    """HTML placeholder for a chart that the script draws, with a line below it for the value under the cursor."""
-    name = escape(str(found["id"]), quote=True)
+def charts_html(charts: Sequence[Chart], begins: str) -> str:
+    """HTML placeholders for the charts whose names begin as stated, each with a line for the value under the cursor."""
+    return "".join(_placeholder(found) for found in charts if str(found["id"]).startswith(begins))
+
+
+def _placeholder(found: Chart) -> str:
+    name, words = (escape(str(found[key]), quote=True) for key in ("id", "words"))
     note = f'<p class="hint">{escape(str(found["note"]))}.</p>' if found.get("note") else ""
     return (
-        f'<div class="chart" id="{name}" tabindex="0" role="group" aria-label="{escape(words, quote=True)}. '
-        f'{HINT}"></div><p class="readout" aria-live="polite"></p>{note}'
+        f'<div class="chart" id="{name}" tabindex="0" role="group" aria-label="{words}. {HINT}"></div>'
+        f'<p class="readout" aria-live="polite"></p>{note}'
     )
 
 

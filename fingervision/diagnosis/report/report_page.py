@@ -1,6 +1,5 @@
 """report.html: the whole result on one self-contained HTML page."""
 
-import base64
 from collections.abc import Sequence
 from html import escape
 
@@ -9,13 +8,15 @@ import numpy as np
 from fingervision.diagnosis.bodies.body_evidence import drawing_of
 from fingervision.diagnosis.diagnose import Diagnosis
 from fingervision.diagnosis.inference.verdict import UNDECIDED
-from fingervision.diagnosis.report.figure_files import effect_figure, residual_figure
+from fingervision.diagnosis.report.figure_files import effect_residual
 from fingervision.diagnosis.report.html_parts import (
     HINT,
+    Chart,
     GapCurves,
     bullets,
-    chart,
+    charts_html,
     charts_of,
+    effect_charts,
     gap_curves,
     named,
     number,
@@ -29,7 +30,6 @@ from fingervision.diagnosis.report.positioning_of_data import positioning_html
 from fingervision.diagnosis.report.report_parts import added_sections
 from fingervision.diagnosis.report.residual_localization import by_channel
 from fingervision.diagnosis.report.sentences import EDGES, QUESTION
-from fingervision.diagnosis.report.vector_figure import png_bytes
 from fingervision.domain.report import DiagnosisReport, Disagreement, Verdict
 from fingervision.effects import catalogue
 from fingervision.storage.provenance import Provenance
@@ -75,35 +75,28 @@ def report_page(diagnosis: Diagnosis, made: Provenance, frames: str, measurement
         Sentences on the measurement: its clocks, and the uncertainty of the gap.
     """
     report = diagnosis.report
-    history = diagnosis.data.chain.history
-    n = history.input_mm.size
     before, after = (by_channel(diagnosis.data, mm) for mm in (diagnosis.before_mm, diagnosis.after_mm))
-    residual_mm = {SIMULATION: diagnosis.before_mm[:n]}
-    if report.effects:
-        residual_mm[CORRECTED] = diagnosis.after_mm[:n]
-    charts = charts_of(curves_of(diagnosis), residual_mm, diagnosis.left_out)
-    by_name = {str(found["id"]): found for found in charts}
-    gap = chart(by_name["gap-input"], "Gap over the input, measured and predicted")
-    if "gap-time" in by_name:
-        gap += chart(by_name["gap-time"], "Gap over time, measured and predicted")
-    residuals = chart(by_name["residual-input"], "Measured minus predicted gap over the input")
-    if "residual-time" in by_name:
-        residuals += chart(by_name["residual-time"], "Measured minus predicted gap over time")
-    if history.both_edges or history.force:
-        figure = png_bytes(residual_figure(before, after if report.effects else None, history, diagnosis.left_out))
-        residuals += _picture(figure, "Measured minus predicted of each finger and channel, over input and time")
+    residuals = {
+        channel: {SIMULATION: values, **({CORRECTED: after[channel]} if report.effects else {})}
+        for channel, values in before.items()
+    }
+    charts = charts_of(curves_of(diagnosis), residuals, diagnosis.left_out)
+    for effect in report.effects:
+        if effect.name in catalogue():
+            charts += effect_charts(effect.name, *effect_residual(effect.name))
     parameters = [
         [named(effect.name), escape(effect.display_name(name)), *with_uncertainty(e)]
         for effect in report.effects
         for name, e in effect.parameters.items()
     ]
+    told = "What explains a part" if report.verdict is Verdict.UNKNOWN else "What was named"
     sections = [
-        ("Gap against input", f'{gap}<p class="hint">{HINT}</p>'),
+        ("Gap against input", f'{charts_html(charts, "gap-")}<p class="hint">{HINT}</p>'),
         ("Where they disagree", bullets([place.words for place in report.where]) if report.where else NOWHERE),
-        ("Difference before and after", residuals),
+        ("Difference before and after", charts_html(charts, "residual-")),
         ("At the turning points", frames),
         ("How much", _how_much(report)),
-        ("What explains a part" if report.verdict is Verdict.UNKNOWN else "What was named", _mechanisms(report)),
+        (told, _mechanisms(report, charts)),
         ("Parameters", table(["effect", "parameter", "value", "U (k = 2)"], parameters)),
         ("Explanations that these data cannot distinguish", _apart(report.alternatives)),
         ("The next run", f"<p>{escape(report.next_step)}</p>"),
@@ -134,11 +127,6 @@ def _heading(report: DiagnosisReport) -> str:
     return IN_PART if report.verdict is Verdict.UNKNOWN and report.effects else HEADINGS[report.verdict]
 
 
-def _picture(png: bytes, words: str) -> str:
-    image = base64.b64encode(png).decode()
-    return f'<img class="paper" alt="{escape(words, quote=True)}" src="data:image/png;base64,{image}">'
-
-
 def _how_much(report: DiagnosisReport) -> str:
     d = report.disagreement
     unseen = ["runs left out of the fit", number(d.unseen_before_rms_mm), number(d.unseen_after_rms_mm)]
@@ -162,7 +150,7 @@ def _counted(d: Disagreement) -> str:
     return f"counted: {d.rows - d.rows_left_out} of {d.rows} rows{offsets}"
 
 
-def _mechanisms(report: DiagnosisReport) -> str:
+def _mechanisms(report: DiagnosisReport, charts: Sequence[Chart]) -> str:
     """Each named effect in words, with its formula, its source and its typical residual."""
     if not report.effects:
         return "<p>Nothing.</p>"
@@ -171,9 +159,7 @@ def _mechanisms(report: DiagnosisReport) -> str:
         f"<h3>{escape(effect.name)}</h3><p>{escape(known[effect.name].words.capitalize())}: "
         f"<code>{escape(known[effect.name].formula)}</code> ({escape(known[effect.name].source)}). Its "
         f"residual (measured minus simulated): {escape(known[effect.name].residual)}.</p>"
-        + _picture(
-            png_bytes(effect_figure(effect.name)), f"{effect.name} alone, in a simulated gripper that opens and closes"
-        )
+        + charts_html(charts, f"effect-{effect.name}-")
         for effect in report.effects
         if effect.name in known
     )

@@ -34,6 +34,8 @@ def write_vector(figure: Figure, stem: Path) -> tuple[Path, ...]:
         metadata = {"Date": None} if kind == "svg" else {"CreationDate": None, "Producer": None}
         with plain_style():
             figure.savefig(path, format=kind, metadata=metadata)
+        # One layout serves every format; it takes longer than drawing.
+        figure.set_layout_engine("none")
         written.append(path)
     return tuple(written)
 
