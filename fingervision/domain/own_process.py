@@ -14,25 +14,39 @@ PROGRAM = "import sys; sys.path[:] = {path!r}; from fingervision.domain.own_proc
 def in_own_process(work: Callable[[*Ts], T], *given: *Ts) -> T:
     """Call a function in another process; in this one if no other can be started or the function fails there.
 
+    See `called_apart`.
+    """
+    try:
+        return called_apart(work, *given)
+    except (OSError, subprocess.SubprocessError):  # no memory for a second process, or no interpreter
+        return work(*given)
+
+
+def called_apart(work: Callable[[*Ts], T], *given: *Ts) -> T:
+    """Call a function in another process.
+
     Parameters
     ----------
     work : callable
         A function of a module.
     *given
         What it is called with; as its result, it must pickle.
+
+    Raises
+    ------
+    OSError
+        No other process can be started.
+    subprocess.CalledProcessError
+        The function raised an exception, or the process crashed.
     """
-    sent = pickle.dumps((work, given))
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", PROGRAM.format(path=sys.path)],
-            input=sent,
-            capture_output=True,
-            check=True,
-            # Ctrl-C in the terminal is for this process, which may still complete a run.
-            start_new_session=True,
-        )
-    except (OSError, subprocess.SubprocessError):  # no memory for a second process, or no interpreter
-        return work(*given)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM.format(path=sys.path)],
+        input=pickle.dumps((work, given)),
+        capture_output=True,
+        check=True,
+        # Ctrl-C in the terminal is for this process, which may still complete a run.
+        start_new_session=True,
+    )
     answer: T = pickle.loads(done.stdout)  # of this program's own process, from a private pipe
     return answer
 

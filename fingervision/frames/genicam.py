@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import DeviceError, InputFileError, MissingLibraryError
+from fingervision.domain.errors import DeviceError, InputFileError
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
+from fingervision.domain.needed_library import needed_library
 from fingervision.domain.status import Status
 from fingervision.frames.controls import EXPOSURE, FRAME_RATE, GAIN, CameraControl
 from fingervision.frames.source import Description, Endable, Received, Wish
@@ -286,17 +287,14 @@ def levels(data: NDArray[np.generic], size: tuple[int, int]) -> Pixels:
 
 def _connected(name: str) -> tuple[Any, Any]:
     """Open the producer and the camera."""
-    try:
-        from harvesters.core import Harvester
-    except ImportError as error:
-        raise MissingLibraryError("harvesters", "genicam", f"The camera {name}") from error
+    harvesters = needed_library("harvesters.core", "genicam", f"The camera {name}")
     file, _, serial = name.removeprefix(START).partition("#")
     if not Path(file).is_file():
         raise InputFileError(
             f"There is no GenTL producer {file}: name the .cti file that the camera's maker installs, as in "
             f"{START}/opt/maker/lib/producer.cti."
         )
-    harvester = Harvester()
+    harvester = harvesters.Harvester()
     try:
         harvester.add_file(str(Path(file).resolve()))
         harvester.update()

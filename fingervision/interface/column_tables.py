@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError
@@ -17,6 +16,7 @@ from fingervision.storage import drive_csv, measured_table, simulation_table
 from fingervision.storage.csv_columns import Numbers
 
 DRIVE_COLUMNS = ("time_s", "input_mm")
+GAP_COLUMNS = ("input_mm", "gap_mm")
 
 
 def drive_from_columns(table: Any) -> DriveHistory:
@@ -32,10 +32,7 @@ def drive_from_columns(table: Any) -> DriveHistory:
         Times do not increase, or the rows of a run are not contiguous.
     """
     columns = columns_of("drive", table, "a drive table's file name, DriveHistory, DataFrame or mapping of columns")
-    for name in DRIVE_COLUMNS:
-        if name not in columns:
-            raise ArgumentError("drive", f"have a column {name}", f"has {', '.join(columns) or 'none'}")
-    values = {name: _numbers("drive", name, columns[name]) for name in drive_csv.COLUMNS if name in columns}
+    values = _values("drive", columns, DRIVE_COLUMNS, drive_csv.COLUMNS)
     for name, numbers in values.items():
         if not numbers.present.all():
             raise ArgumentError("drive", f"have a number in every row of {name}", "has none in some")
@@ -59,10 +56,7 @@ def measured_from_columns(table: Any) -> MeasuredTable:
     columns = columns_of(
         "measured", table, "a table's file name, Measurement, MeasuredTable, DataFrame or mapping of columns"
     )
-    for name in ("input_mm", "gap_mm"):
-        if name not in columns:
-            raise ArgumentError("measured", f"have a column {name}", f"has {', '.join(columns) or 'none'}")
-    values = {name: _numbers("measured", name, columns[name]) for name in measured_table.NUMBERS if name in columns}
+    values = _values("measured", columns, GAP_COLUMNS, measured_table.NUMBERS)
     runs = ["" if _is_missing(run) else str(run) for run in columns["run"]] if "run" in columns else None
     table_in_memory = measured_table.measured_rows(Path("measured"), values, runs)
     # A columns.toml in the current folder does not apply to columns in memory.
@@ -79,12 +73,8 @@ def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:
     DataError
         There are fewer than two rows, an input occurs twice, or the gap does not depend on the input.
     """
-    for name in ("input_mm", "gap_mm"):
-        if name not in columns:
-            raise ArgumentError("model", f"have a column {name}", f"has {', '.join(columns) or 'none'}")
-    names = ("input_mm", "gap_mm", "left_mm", "right_mm", "force_n")
-    values = {name: _numbers("model", name, columns[name]) for name in names if name in columns}
-    return simulation_table.simulation_rows(Path("simulation"), values)
+    names = (*GAP_COLUMNS, "left_mm", "right_mm", "force_n")
+    return simulation_table.simulation_rows(Path("simulation"), _values("model", columns, GAP_COLUMNS, names))
 
 
 def columns_of(argument: str, table: Any, must: str) -> dict[str, list[Any]]:
@@ -107,6 +97,16 @@ def columns_of(argument: str, table: Any, must: str) -> dict[str, list[Any]]:
     return columns
 
 
+def _values(
+    argument: str, columns: Mapping[str, list[Any]], needed: tuple[str, ...], known: tuple[str, ...]
+) -> dict[str, Numbers]:
+    """Return the known columns of a table as numbers; those that are needed must be there."""
+    for name in needed:
+        if name not in columns:
+            raise ArgumentError(argument, f"have a column {name}", f"has {', '.join(columns) or 'none'}")
+    return {name: _numbers(argument, name, columns[name]) for name in known if name in columns}
+
+
 def _numbers(argument: str, name: str, cells: list[Any]) -> Numbers:
     present = np.array([not _is_missing(cell) for cell in cells], dtype=bool)
     value = np.zeros(len(cells))
@@ -119,11 +119,7 @@ def _numbers(argument: str, name: str, cells: list[Any]) -> Numbers:
             ) from None
     if not np.all(np.isfinite(value)):
         raise ArgumentError(argument, f"have finite numbers in column {name}", "has an infinite one")
-    return Numbers(_array(value), present)
-
-
-def _array(value: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(value, dtype=np.float64)
+    return Numbers(value, present)
 
 
 def _is_missing(cell: Any) -> bool:

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fingervision.domain.errors import MissingLibraryError, UsageError
+from fingervision.domain.errors import UsageError
 from fingervision.domain.field import declared
 from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.needed_library import needed_library
 from fingervision.domain.status import Status
 from fingervision.interface.column_tables import measured_from_columns
 from fingervision.measuring.in_memory import MeasuredInMemory
@@ -74,17 +75,15 @@ def dataframe(found: MeasuredInMemory) -> "pd.DataFrame":
     MissingLibraryError
         pandas is not installed.
     """
-    try:
-        import pandas as pd
-    except ImportError as error:
-        raise MissingLibraryError("pandas", "dataframe", "to_dataframe") from error
+    pandas = needed_library("pandas", "dataframe", "to_dataframe")
     kinds = {"frame": "Int64", **dict.fromkeys(TEXTS, "string")}
-    return pd.DataFrame(
+    frame: pd.DataFrame = pandas.DataFrame(
         {
-            name: pd.array([_cell(row, name) for row in found.rows], dtype=kinds.get(name, "Float64"))
+            name: pandas.array([_cell(row, name) for row in found.rows], dtype=kinds.get(name, "Float64"))
             for name in columns_of(found)
         }
     )
+    return frame
 
 
 def dataset(found: MeasuredInMemory) -> "xr.Dataset":
@@ -95,10 +94,7 @@ def dataset(found: MeasuredInMemory) -> "xr.Dataset":
     MissingLibraryError
         xarray is not installed.
     """
-    try:
-        import xarray as xr
-    except ImportError as error:
-        raise MissingLibraryError("xarray", "dataframe", "to_xarray") from error
+    xarray = needed_library("xarray", "dataframe", "to_xarray")
     variables: dict[str, Any] = {}
     for name in columns_of(found)[1:]:
         cells = [_cell(row, name) for row in found.rows]
@@ -108,7 +104,9 @@ def dataset(found: MeasuredInMemory) -> "xr.Dataset":
             numbers = np.array([np.nan if each is None else each for each in cells], dtype=np.float64)
             variables[name] = (("frame",), numbers, {"units": name.rpartition("_")[2]})
     frames = np.array([row.frame for row in found.rows], dtype=np.int64)
-    made = xr.Dataset(variables, coords={"frame": frames}, attrs={"recording": found.summary["recording"]["name"]})
+    made: xr.Dataset = xarray.Dataset(
+        variables, coords={"frame": frames}, attrs={"recording": found.summary["recording"]["name"]}
+    )
     return made.set_coords("time_s")
 
 

@@ -17,10 +17,10 @@ from fingervision.domain.effect import History
 from fingervision.domain.errors import (
     ArgumentError,
     ArgumentTypeError,
-    MissingLibraryError,
     OutputError,
     UnknownNameError,
 )
+from fingervision.domain.needed_library import needed_library
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.response import Response
 from fingervision.effects import catalogue
@@ -116,11 +116,8 @@ class Simulation:
         MissingLibraryError
             pandas is not installed (it comes with the extra `dataframe`).
         """
-        try:
-            import pandas as pd
-        except ImportError as error:
-            raise MissingLibraryError("pandas", "dataframe", "to_dataframe") from error
-        return pd.DataFrame(self.columns())
+        frame: pd.DataFrame = needed_library("pandas", "dataframe", "to_dataframe").DataFrame(self.columns())
+        return frame
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":
         """Draw the gap over time, or over the input if there are no times.

@@ -4,7 +4,6 @@ Libraries: ezdxf (https://ezdxf.mozman.at) for DXF, svgelements (https://github.
 SVG. Arcs of circles stay arcs; ellipses, splines and Bezier curves become arcs within 1 micrometre.
 """
 
-import importlib
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
@@ -14,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import DataError, InputFileError, MissingLibraryError, UsageError
+from fingervision.domain.errors import DataError, InputFileError, UsageError
+from fingervision.domain.needed_library import needed_library
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Curve, Point, Polygon, in_arcs
@@ -74,10 +74,7 @@ def read_outline(path: Path, layer: str = "", unit_mm: float | None = None) -> t
 
 
 def _library(name: str, path: Path) -> Any:
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise MissingLibraryError(name, "outlines", f"{path} is a drawing, which") from error
+    return needed_library(name, "outlines", f"{path} is a drawing, which")
 
 
 def _dxf_chains(path: Path, layer: str, unit_mm: float | None) -> Iterator[Chain]:

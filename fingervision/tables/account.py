@@ -254,10 +254,10 @@ def _targets(raw: RawTable, given: Entry) -> Account | None:
         rows, question = None, error
     if rows is None and question is None:
         return None
-    with_gap = [] if rows is None else [row for row in rows.rows if row.gap_mm is not None]
+    with_gap = [] if rows is None else [row for row in rows.rows if row.position_mm is not None]
     columns = {
-        "input": Numbers.whole(np.array([row.input_mm for row in with_gap])),
-        "gap": Numbers.whole(np.array([row.gap_mm for row in with_gap], dtype=np.float64)),
+        "input": Numbers.whole(np.array([row.target_mm for row in with_gap])),
+        "gap": Numbers.whole(np.array([row.position_mm for row in with_gap], dtype=np.float64)),
     }
     return Account(
         raw.path, "measured", f"{raw.what}, a table of targets, cycles and directions (ISO 230-2)", own=False, taken=(),

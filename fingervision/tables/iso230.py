@@ -67,7 +67,10 @@ the targets are closer together, so that it does not pass a neighbouring target.
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One reading at a target: position (None if missing), direction (+1 from below, -1 from above), cycle, time."""
+    """One reading at a target: position (None if missing), direction (+1 from below, -1 from above), cycle, time.
+
+    A reading without a position is only a point on the path of the input.
+    """
 
     target_mm: float
     position_mm: float | None
@@ -78,19 +81,8 @@ class Reading:
     u_random_mm: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class PathRow:
-    """A row of a measured table; a row without a gap is only a point on the path of the input."""
-
-    input_mm: float
-    gap_mm: float | None
-    time_s: float
-    run: str
-    u_random_mm: float | None = None
-
-
-def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tuple[str, ...]]:
-    """Sort readings in the order of travel, and add a row beyond a target wherever the axis must have overshot it.
+def approach_path(readings: Sequence[Reading]) -> tuple[tuple[Reading, ...], tuple[str, ...]]:
+    """Sort readings in the order of travel, and add one beyond a target wherever the axis must have overshot it.
 
     Parameters
     ----------
@@ -99,8 +91,8 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
 
     Returns
     -------
-    rows : tuple of PathRow
-        Rows, run after run, with increasing times within each run.
+    rows : tuple of Reading
+        Readings, run after run, with increasing times within each run.
     notes : tuple of str
         Assumptions that were made, one sentence each.
     """
@@ -120,14 +112,11 @@ def approach_path(readings: Sequence[Reading]) -> tuple[tuple[PathRow, ...], tup
     targets = np.unique([reading.target_mm for reading in readings])
     closest = float(np.min(np.diff(targets))) if targets.size > 1 else LONGEST_OVERSHOOT_MM
     beyond = min(LONGEST_OVERSHOOT_MM, closest)
-    rows: list[PathRow] = []
-    added = 0
+    rows: list[Reading] = []
     for run in dict.fromkeys(reading.run for reading in readings):
         mine = [reading for reading in readings if reading.run == run]
-        ordered = sorted(mine, key=_time) if timed else sorted(mine, key=_travel)
-        path, times = _with_overshoots(ordered, beyond, timed)
-        added += len(path) - len(ordered)
-        rows += [replace(row, time_s=time) for row, time in zip(path, times, strict=True)]
+        rows += _with_overshoots(sorted(mine, key=_time if timed else _travel), beyond, timed)
+    added = len(rows) - len(readings)
     if not timed:
         notes.append(
             "The table has no times: within a cycle, targets approached from below were taken in ascending order, then "
@@ -157,29 +146,25 @@ def _travel(reading: Reading) -> tuple[int, int, float]:
     return reading.cycle, -reading.side, reading.side * reading.target_mm
 
 
-def _with_overshoots(ordered: Sequence[Reading], beyond: float, timed: bool) -> tuple[list[PathRow], list[float]]:
-    """Rows of a run with their times; an added overshoot has the mean time of its neighbouring rows."""
-    path: list[PathRow] = []
-    times: list[float] = []
+def _with_overshoots(ordered: Sequence[Reading], beyond: float, timed: bool) -> list[Reading]:
+    """Readings of a run with their overshoots; each of these has the mean time of its neighbours."""
+    path: list[Reading] = []
     clock = [_time(reading) for reading in ordered]
-    usual = float(np.median(np.diff(clock))) if timed and len(clock) > 1 else NOMINAL_S
-    for reading, time in zip(ordered, clock, strict=True):
-        came_from = path[-1].input_mm if path else None
-        if came_from is None or reading.side * (reading.target_mm - came_from) <= 0.0:
-            path.append(PathRow(reading.target_mm - reading.side * beyond, None, 0.0, reading.run))
-            times.append((times[-1] + time) / 2.0 if times else time - usual / 2.0)
-        path.append(PathRow(reading.target_mm, reading.position_mm, 0.0, reading.run, reading.u_random_mm))
-        times.append(time)
-    if not timed:
-        times = [NOMINAL_S * k for k in range(len(path))]
-    return path, times
+    usual_s = float(np.median(np.diff(clock))) if timed and len(clock) > 1 else NOMINAL_S
+    for reading, time_s in zip(ordered, clock, strict=True):
+        if not path or reading.side * (reading.target_mm - path[-1].target_mm) <= 0.0:
+            turned_s = (_time(path[-1]) + time_s) / 2.0 if path else time_s - usual_s / 2.0
+            turned_mm = reading.target_mm - reading.side * beyond
+            path.append(Reading(turned_mm, None, reading.side, reading.cycle, reading.run, turned_s))
+        path.append(reading)
+    return path if timed else [replace(row, time_s=NOMINAL_S * k) for k, row in enumerate(path)]
 
 
 @dataclass(frozen=True, slots=True)
 class Iso230Rows:
-    """Rows of a measured table, including added rows for overshoots, and one sentence for each assumption."""
+    """Readings in the order of travel, including those added for overshoots; one sentence for each assumption."""
 
-    rows: tuple[PathRow, ...]
+    rows: tuple[Reading, ...]
     notes: tuple[str, ...]
 
     def table(self, path: Path, notes: Sequence[str]) -> MeasuredTable:
@@ -191,8 +176,8 @@ class Iso230Rows:
             There are too few rows, or the position never changes.
         """
         columns = {
-            "input_mm": _numbers([row.input_mm for row in self.rows]),
-            "gap_mm": _numbers([row.gap_mm for row in self.rows]),
+            "input_mm": _numbers([row.target_mm for row in self.rows]),
+            "gap_mm": _numbers([row.position_mm for row in self.rows]),
             "time_s": _numbers([row.time_s for row in self.rows]),
         }
         u = _numbers([row.u_random_mm for row in self.rows])
@@ -306,13 +291,10 @@ class _Beside:
 
 
 def _beside(raw: RawTable, names: Sequence[ColumnName], given: Entry, questions: list[Question]) -> _Beside:
-    places = {
-        role: found[0]
-        for role in ("direction", "cycle", "run", "time", "u_random")
-        if len(found := _places(names, role, given)) == 1
-    }
+    roles = ("direction", "cycle", "run", "time", "u_random")
+    places = {role: found[0] for role in roles if len(found := _places(names, role, given)) == 1}
     return _Beside(
-        {role: _words(raw, places[role]) for role in ("direction", "cycle", "run") if role in places},
+        {role: raw.columns[places[role]].words() for role in roles[:3] if role in places},
         _seconds(raw, names, places["time"], given, questions) if "time" in places else None,
         _length(raw, names, places["u_random"], "u_random", given, questions) if "u_random" in places else None,
     )
@@ -460,13 +442,6 @@ def _seconds(
         questions.append(Question(f"the unit of '{raw.columns[place].name}' (time) is not stated", "units.time=s"))
     values = _plain(raw, place)
     return Numbers(values.value * (size or 1.0), values.present)
-
-
-def _words(raw: RawTable, place: int) -> list[str]:
-    content = raw.columns[place].content
-    if isinstance(content, Numbers):
-        return [f"{value:g}" if there else "" for value, there in zip(content.value, content.present, strict=True)]
-    return [cell.strip() for cell in content]
 
 
 def _readings(

@@ -36,6 +36,13 @@ class RawColumn:
     def __len__(self) -> int:
         return self.content.value.size if isinstance(self.content, Numbers) else len(self.content)
 
+    def words(self) -> tuple[str, ...]:
+        """Return the cells as texts, such as names of runs; empty where a number is missing."""
+        if not isinstance(self.content, Numbers):
+            return tuple(cell.strip() for cell in self.content)
+        pairs = zip(self.content.value, self.content.present, strict=True)
+        return tuple(f"{value:g}" if there else "" for value, there in pairs)
+
 
 MOST_COLUMNS = 4096
 """Columns of a table: loggers write at most some hundreds; interpreting a column takes about 0.2 ms, and a table of 100

@@ -386,12 +386,7 @@ def _runs(
 ) -> tuple[str, ...] | None:
     """Name of each row's run: from the column of runs, or from restarts of the time that the user declares as runs."""
     if (place := chosen.get("run")) is not None:
-        content = raw.columns[place].content
-        if isinstance(content, Numbers):
-            return tuple(
-                f"{value:g}" if there else "" for value, there in zip(content.value, content.present, strict=True)
-            )
-        return tuple(cell.strip() for cell in content)
+        return raw.columns[place].words()
     if given.words.get("runs") != "restart":
         return None
     starts = np.zeros(raw.rows, dtype=np.intp)

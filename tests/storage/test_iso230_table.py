@@ -66,11 +66,11 @@ def check(path: Path) -> None:
     """Every reading is at its target, with its deviation, approached from its side in its cycle."""
     read = read_iso230_table(path)
     assert read is not None
-    inputs = np.array([row.input_mm for row in read.rows])
-    measured = np.array([row.gap_mm is not None for row in read.rows])
+    inputs = np.array([row.target_mm for row in read.rows])
+    measured = np.array([row.position_mm is not None for row in read.rows])
     visits = repeated_targets(inputs, measured, (slice(0, inputs.size),), np.array([row.time_s for row in read.rows]))
     assert isinstance(visits, RepeatedTargets)
-    gaps = np.array([row.gap_mm for row in read.rows if row.gap_mm is not None])
+    gaps = np.array([row.position_mm for row in read.rows if row.position_mm is not None])
     assert gaps.size == len(DEVIATION)
     for gap, target, cycle, side in zip(gaps, inputs[measured], visits.cycle, visits.direction, strict=True):
         assert gap - target == pytest.approx(DEVIATION[target, cycle + 1, side], abs=1e-9)
@@ -106,7 +106,7 @@ def test_the_reader_of_measured_tables_takes_the_rows(tmp_path: Path) -> None:
 
 def test_overshoots_lead_to_the_stated_side(tmp_path: Path) -> None:
     read = read_iso230_table(write(tmp_path, long_form()))
-    beyond = [row.input_mm for row in read.rows if row.gap_mm is None]
+    beyond = [row.target_mm for row in read.rows if row.position_mm is None]
     assert beyond == [-2.5, 2.5] * CYCLES
     assert any("rows without a gap were added 0.5 mm beyond" in note for note in read.notes)
     assert any("no times" in note and "30 s" in note for note in read.notes)
@@ -115,9 +115,11 @@ def test_overshoots_lead_to_the_stated_side(tmp_path: Path) -> None:
 def test_a_single_direction_is_approached_from_it_each_time(tmp_path: Path) -> None:
     text = "\n".join(line for line in long_form().splitlines() if ",up," not in line)
     read = read_iso230_table(write(tmp_path, text))
-    assert [row.input_mm for row in read.rows if row.gap_mm is None] == [2.5] * CYCLES
-    inputs = np.array([row.input_mm for row in read.rows])
-    visits = repeated_targets(inputs, np.array([r.gap_mm is not None for r in read.rows]), (slice(0, inputs.size),))
+    assert [row.target_mm for row in read.rows if row.position_mm is None] == [2.5] * CYCLES
+    inputs = np.array([row.target_mm for row in read.rows])
+    visits = repeated_targets(
+        inputs, np.array([r.position_mm is not None for r in read.rows]), (slice(0, inputs.size),)
+    )
     assert np.all(visits.direction == -1)
 
 
@@ -130,14 +132,16 @@ def test_times_give_the_order_and_stay(tmp_path: Path) -> None:
                 lines.append(f"{target},{cycle},{word},{target - 0.01 * sign},{time}")
                 time += 10.0
     read = read_iso230_table(write(tmp_path, "\n".join(lines)))
-    readings = [row for row in read.rows if row.gap_mm is not None]
+    readings = [row for row in read.rows if row.position_mm is not None]
     assert [row.time_s for row in readings] == [10.0 * k for k in range(12)]
     times = np.array([row.time_s for row in read.rows])
     assert np.all(np.diff(times) > 0.0)
-    inputs = np.array([row.input_mm for row in read.rows])
-    visits = repeated_targets(inputs, np.array([r.gap_mm is not None for r in read.rows]), (slice(0, inputs.size),))
+    inputs = np.array([row.target_mm for row in read.rows])
+    visits = repeated_targets(
+        inputs, np.array([r.position_mm is not None for r in read.rows]), (slice(0, inputs.size),)
+    )
     assert np.array_equal(visits.direction, np.tile([1, -1], 6))
-    deviation = np.array([row.gap_mm for row in readings]) - visits.target_mm
+    deviation = np.array([row.position_mm for row in readings]) - visits.target_mm
     found = positioning_accuracy(visits.target_mm, deviation, visits.direction, visits.cycle)
     assert found.value_mm("B_mean") == pytest.approx(-0.02)
     assert not any("no times" in note for note in read.notes)
@@ -180,7 +184,7 @@ def test_runs_cycles_without_numbers_and_missing_readings(tmp_path: Path) -> Non
             lines += [f"{run},{t},{cycle},up,{0.001 if t else ''},0.0005" for t in (0, 1, 2)]
     read = read_iso230_table(write(tmp_path, "\n".join(lines)))
     assert list(dict.fromkeys(row.run for row in read.rows)) == ["cold", "warm"]
-    assert sum(row.gap_mm is None for row in read.rows) == 12  # six overshoots, six missing readings
+    assert sum(row.position_mm is None for row in read.rows) == 12  # six overshoots, six missing readings
     assert read.rows[0].time_s == read.rows[12].time_s == 0.0
     assert {row.u_random_mm for row in read.rows} == {None, 0.0005}
 
@@ -244,5 +248,7 @@ def test_a_published_table_comes_back_in_its_order_of_travel(tmp_path: Path) -> 
     order = np.random.default_rng(2).permutation(len(lines))
     text = "\n".join(["target_mm,cycle,direction,position_mm", *(lines[k] for k in order)])
     read = read_iso230_table(write(tmp_path, text))
-    assert [row.input_mm for row in read.rows][: len(rows) - 1] == [float(row["input_mm"]) for row in rows][:-1]
-    assert [row.gap_mm for row in read.rows if row.gap_mm is not None] == [position for _, position in readings]
+    assert [row.target_mm for row in read.rows][: len(rows) - 1] == [float(row["input_mm"]) for row in rows][:-1]
+    assert [row.position_mm for row in read.rows if row.position_mm is not None] == [
+        position for _, position in readings
+    ]

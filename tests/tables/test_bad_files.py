@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fingervision.domain import needed_library
 from fingervision.domain.errors import DataError, FingervisionError, MissingLibraryError
-from fingervision.tables import needed_library, text_file
+from fingervision.tables import text_file
 from fingervision.tables.formats import read_raw, xlsx
 from fingervision.tables.formats._apart import read_apart
 from fingervision.tables.mapping import Entry

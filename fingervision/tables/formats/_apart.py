@@ -5,17 +5,14 @@ For example, scipy 1.17 ends with a segmentation fault on some MATLAB files with
 """
 
 import importlib
-import pickle
-import subprocess
-import sys
 from pathlib import Path
+from subprocess import CalledProcessError
 
 from fingervision.domain.errors import DataError, FingervisionError
+from fingervision.domain.own_process import called_apart
 from fingervision.tables.mapping import Entry
-from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawTable
 
-PROGRAM = "import sys; sys.path[:] = {path!r}; from fingervision.tables.formats._apart import serve; serve()"
 SHOWN = 300
 """Number of characters of the output of a failed process that the error message shows."""
 
@@ -61,37 +58,23 @@ def read_apart(name: str, path: Path, given: Entry) -> RawTable:
     OpenQuestionError
         The table can be interpreted in more than one way.
     """
-    # Only the result of this program's own reader is unpickled, from a private pipe; content of the file never is.
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM.format(path=sys.path)],
-        input=pickle.dumps((name, path, given)),
-        capture_output=True,
-        check=False,
-    )
-    if done.returncode != 0 or not done.stdout:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        why = f"signal {-done.returncode}" if done.returncode < 0 else (said[-1][:SHOWN] if said else "no answer")
+    try:
+        found = called_apart(_tried, name, path, given)
+    except CalledProcessError as error:
+        said = error.stderr.decode(errors="replace").strip().splitlines() or ["no answer"]
+        why = f"signal {-error.returncode}" if error.returncode < 0 else said[-1][:SHOWN]
         raise DataError(
             f"{path} is damaged: the library that reads files of this format crashed ({why}). Save the table again, "
             f"or as CSV."
-        )
-    kind, *answer = pickle.loads(done.stdout)
-    if kind == "question":
-        raise OpenQuestionError(*answer)
-    if kind == "error":
-        raise DataError(*answer)
-    table: RawTable = answer[0]
-    return table
+        ) from error
+    if isinstance(found, FingervisionError):
+        raise found
+    return found
 
 
-def serve() -> None:
-    """In the separate process: read one request from standard input and write the result to standard output."""
-    name, path, given = pickle.load(sys.stdin.buffer)
-    answer: tuple[object, ...]
+def _tried(name: str, path: Path, given: Entry) -> RawTable | FingervisionError:
+    """Read a file; an error is a result, too, and so comes back from the separate process."""
     try:
-        answer = ("table", read_guarded(name, path, given))
-    except OpenQuestionError as error:
-        answer = ("question", error.path, error.kind, error.questions)
+        return read_guarded(name, path, given)
     except FingervisionError as error:
-        answer = ("error", str(error))
-    sys.stdout.buffer.write(pickle.dumps(answer))
+        return error

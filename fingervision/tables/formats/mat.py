@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.needed_library import needed_library
 from fingervision.tables.mapping import Entry
-from fingervision.tables.needed_library import needed_library
 from fingervision.tables.parts import chosen_part
 from fingervision.tables.raw_table import RawTable
 from fingervision.tables.vectors import WIDEST, is_numeric, tables_of
@@ -101,7 +101,7 @@ def _plain(value: Any, name: str, passed: list[str], deep: int = 0) -> Any:
 
 def _hdf5(path: Path, passed: list[str]) -> dict[str, Any]:
     """Read version 7.3: data sets in the file itself; links to other files are not followed."""
-    library = needed_library("h5py", path, "a MATLAB 7.3 file (HDF5)")
+    library = needed_library("h5py", "formats", f"{path} is a MATLAB 7.3 file (HDF5), which", "save the table as CSV")
     with library.File(path, "r") as file:
         return _group(library, file, "", passed, 0)
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.needed_library import needed_library
 from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.mapping import Entry
-from fingervision.tables.needed_library import needed_library
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.vectors import numbers
 
@@ -27,7 +27,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 def read(path: Path, given: Entry) -> RawTable:
     """Read all columns that are not nested."""
-    parquet = needed_library("pyarrow.parquet", path, "a Parquet file")
+    parquet = needed_library("pyarrow.parquet", "formats", f"{path} is a Parquet file, which", "save the table as CSV")
     file = parquet.ParquetFile(path)
     about = file.metadata
     size = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.needed_library import needed_library
 from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.mapping import Entry
-from fingervision.tables.needed_library import needed_library
 from fingervision.tables.parts import chosen_part
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.units import column_name
@@ -31,7 +31,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 def read(path: Path, given: Entry) -> RawTable:
     """Read the channels of a group; times are a channel, or follow from the sampling rate of the waveform."""
-    library = needed_library("nptdms", path, "a TDMS file")
+    library = needed_library("nptdms", "formats", f"{path} is a TDMS file, which", "save the table as CSV")
     warned: list[str] = []
     with _warnings(warned), path.open("rb") as opened, library.TdmsFile.open(opened) as file:
         groups = {group.name: group.channels() for group in file.groups() if group.channels()}

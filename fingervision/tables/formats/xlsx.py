@@ -9,9 +9,9 @@ from re import findall
 from typing import Any
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.needed_library import needed_library
 from fingervision.tables.dialect import THOUSANDS, is_number, which_mark
 from fingervision.tables.mapping import Entry
-from fingervision.tables.needed_library import needed_library
 from fingervision.tables.parts import chosen_part
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.raw_table import RawTable
@@ -41,7 +41,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 def read(path: Path, given: Entry) -> RawTable:
     """Read the selected sheet of the workbook."""
-    library = needed_library("openpyxl", path, "an Excel workbook")
+    library = needed_library("openpyxl", "formats", f"{path} is an Excel workbook, which", "save the table as CSV")
     _check_archive(path)
     book = library.load_workbook(path, read_only=True, data_only=True, keep_links=False)
     try:
