@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from threading import Event
 
 from fingervision.domain.errors import ProcessError
 
@@ -26,6 +27,7 @@ BEGIN = (
     "main()\n"
 )
 ENDS_WITHIN_S = 5.0
+LOOK_EVERY_S = 0.1
 # Without these limits, the numerical libraries would use all cores.
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -82,6 +84,12 @@ class BackgroundCommand:
         """Last sentence that the command wrote to standard error, without the program's name."""
         lines = [line for line in self._error.read_text(encoding="utf-8").splitlines() if line.strip()]
         return lines[-1].removeprefix("fingervision: ").removeprefix("Error: ") if lines else ""
+
+    def ended(self, stopped: Event | None = None) -> tuple[int | None, str]:
+        """Wait for the end of the command; return its exit code and complaint, and no code if it was stopped before."""
+        while (code := self.exit_code) is None and not (stopped or Event()).wait(LOOK_EVERY_S):
+            pass
+        return code, self.complaint
 
     def stop(self) -> None:
         """End the command if it is still running."""

@@ -1,6 +1,5 @@
 """The live measurement: every frame is measured on arrival, and the results are kept for the browser pages."""
 
-import secrets
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
@@ -18,12 +17,11 @@ from fingervision.domain.status import Status
 from fingervision.frames.source import Driven
 from fingervision.live.cadence import Cadence
 from fingervision.live.capture import Arrival, Capture, Ended, Happening, OverflowReport
-from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF, Choices
+from fingervision.live.choices import MOVES_ZERO, Choices
 from fingervision.live.frame_measurement import FrameMeasurement, Seen
 from fingervision.live.recorder import Recorder
 from fingervision.live.run_folder import RecordedFrame, RunFolder
-from fingervision.live.supervisor import Supervisor
-from fingervision.live.view import Message, MessageListener, Messages
+from fingervision.live.view import View
 from fingervision.measuring.scale import other_camera
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.grey import full_scale, to_grey
@@ -156,7 +154,7 @@ RowListener = Callable[[GapRow, float], None]
 PictureListener = Callable[[Frame | LostFrame, GapRow | None], None]
 
 
-class Session:
+class Session(View):
     """Measures the frames of a source in a separate thread.
 
     Parameters
@@ -170,16 +168,11 @@ class Session:
     """
 
     def __init__(self, capture: Capture, choices: Choices, out: Path) -> None:
-        self.capture, self.out = capture, out
-        self.description = capture.source.description
-        self.choices = choices.for_frames(self.description)
-        self.identity = secrets.token_hex(4)
-        self.features: dict[str, Any] = {}
+        super().__init__(capture.source.description, choices, out)
+        self.capture = capture
         self.history = History()
         self.cadence, self.exposure = Cadence(), Exposure()
         self.counts: Counter[Status] = Counter()
-        self.seen: Seen | None = None
-        self._messages = Messages()
         self.ended = Event()
         self.on_row: list[RowListener] = []
         self.on_picture: list[PictureListener] = []
@@ -196,7 +189,6 @@ class Session:
         self._recorder: Recorder | None = None
         self._failed: Recorder | None = None
         self._beginning = False
-        self.supervisor = Supervisor(self.say)
         self._overflow = OverflowReport(capture, self.say)
         self._lock = Lock()
         self._stopped = Event()
@@ -231,9 +223,7 @@ class Session:
         recorder = self._recorder
         if recorder is not None:
             recorder.add((name, words))
-        self._messages.say(name, words)
-
-    table: Path | None = None
+        super().say(name, words)
 
     @property
     def row_count(self) -> int:
@@ -256,14 +246,11 @@ class Session:
 
     def state(self) -> dict[str, Any]:
         """Return the state of source and measurement, for the browser page."""
-        cadence, recorder, description = self.cadence, self.recording, self.description
+        cadence, recorder = self.cadence, self.recording
         jitter_s = cadence.jitter_s
         return {
-            "source": description.name,
-            "kind": description.kind,
+            **super().state(),
             "whole": False,
-            "width_px": description.width_px,
-            "height_px": description.height_px,
             "rate_hz": cadence.rate_hz,
             "camera": ", ".join(f"{name} {value}" for name, value in self.capture.source.description.camera.items()),
             "jitter_ms": None if jitter_s is None else 1e3 * jitter_s,
@@ -273,7 +260,6 @@ class Session:
             "exposure": self.exposure.words,
             "silent_s": self.silent_s,
             "ended": self.ended.is_set(),
-            "trouble": self.supervisor.trouble,
             "recording": None
             if recorder is None
             else {
@@ -281,18 +267,7 @@ class Session:
                 "frames": recorder.run.frames,
                 "minutes_left": recorder.minutes_left,
             },
-            **self.choices.state(),
         }
-
-    @property
-    def messages(self) -> deque[Message]:
-        """The most recent messages."""
-        return self._messages.kept
-
-    @property
-    def on_message(self) -> list[MessageListener]:
-        """Listeners that receive every message."""
-        return self._messages.listeners
 
     def choose(self, **changes: Any) -> None:
         """Change settings of measurement or display.
@@ -307,10 +282,7 @@ class Session:
                 raise StateError(
                     "The settings of the measurement cannot be changed while a run is recorded: stop recording first."
                 )
-            chosen, unzeroed = self.choices.changed(**changes)
-            self.choices = chosen.for_frames(self.description)
-        if unzeroed:
-            self.say("zero", ZERO_IS_OFF)
+            super().choose(**changes)
 
     def record(self) -> Path:
         """Begin a recording.
@@ -386,7 +358,7 @@ class Session:
     def _replace(self, rows: Sequence[GapRow], left_out: range) -> None:
         """Replace rows that were measured before the camera was known; pages read all rows again."""
         self.history.replace(rows, left_out)
-        self.identity = secrets.token_hex(4)
+        self.renew()
 
     def _measure(self) -> None:
         while not self._stopped.is_set():

@@ -1,13 +1,15 @@
-"""Protocol of the views that the browser page can show: a live measurement or a recording."""
+"""Base of the views that the browser page can show: a live measurement or a recording."""
 
+import secrets
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from fingervision.frames.source import Description
-from fingervision.live.choices import Choices
+from fingervision.live.choices import ZERO_IS_OFF, Choices
 from fingervision.live.frame_measurement import Seen
 from fingervision.live.supervisor import Supervisor
 from fingervision.storage.gaps_csv import GapRow
@@ -30,100 +32,109 @@ class Message:
 MessageListener = Callable[[Message], None]
 
 
-class Messages:
-    """The most recent messages, and the listeners that receive new messages."""
+class View(ABC):
+    """A live measurement or a recording, as the browser page shows it and its commands use it.
 
-    def __init__(self) -> None:
-        self.kept: deque[Message] = deque(maxlen=MESSAGES_KEPT)
-        self.listeners: list[MessageListener] = []
-        self._said = 0
+    Parameters
+    ----------
+    description : Description
+        Description of the source.
+    choices : Choices
+        Settings chosen by the user.
+    out : Path
+        Folder for files that the user saves.
+    """
+
+    def __init__(self, description: Description, choices: Choices, out: Path) -> None:
+        self.description, self.out = description, out
+        self.choices = choices.for_frames(description)
+        self.features: dict[str, Any] = {}
+        """Additions to the measurement (a model, a test bed) by name, for the commands of each topic."""
+        self.seen: Seen | None = None
+        """The displayed frame with its measurement."""
+        self.messages: deque[Message] = deque(maxlen=MESSAGES_KEPT)
+        """The most recent messages."""
+        self.on_message: list[MessageListener] = []
+        """Listeners that receive every message."""
+        self.supervisor = Supervisor(self.say)
+        """Supervisor of all threads and tasks of this view."""
+        self._said = self._generation = 0
+        self._identity = secrets.token_hex(4)
+
+    @property
+    def identity(self) -> str:
+        """Word that changes when the numbering of rows starts again."""
+        return f"{self._identity}-{self._generation}"
+
+    def renew(self) -> None:
+        """Send all rows to the browser pages again, because they or what stands beside them have changed."""
+        self._generation += 1
 
     def say(self, name: str, words: str) -> None:
         """Send a message to all users."""
         self._said += 1
         message = Message(self._said, name, words)
-        self.kept.append(message)
-        for listener in self.listeners:
+        self.messages.append(message)
+        for listener in self.on_message:
             listener(message)
-
-
-class View(Protocol):
-    """A live measurement or a recording, as used by the browser page and its commands.
-
-    Attributes
-    ----------
-    out : Path
-        Folder for files that the user saves.
-    choices : Choices
-        Settings that the user chose.
-    features : dict
-        Additions to the measurement (a model, a test bed) by name, for the commands of each topic.
-    supervisor : Supervisor
-        Supervisor of all threads and tasks of this view.
-    """
-
-    out: Path
-    choices: Choices
-    features: dict[str, Any]
-    supervisor: Supervisor
-
-    @property
-    def identity(self) -> str:
-        """Number that changes when the numbering of rows starts again."""
-        ...
-
-    @property
-    def description(self) -> Description:
-        """Description of the source."""
-        ...
-
-    @property
-    def seen(self) -> Seen | None:
-        """The displayed frame with its measurement."""
-        ...
-
-    @property
-    def messages(self) -> deque[Message]:
-        """The most recent messages."""
-        ...
 
     @property
     def in_a_hurry(self) -> bool:
         """Whether the measurement is too slow, so that previews should not be rendered."""
-        ...
+        return False
 
     @property
     def table(self) -> Path | None:
         """File of the complete table; None if the table is incomplete."""
-        ...
+        return None
 
     @property
+    @abstractmethod
     def row_count(self) -> int:
         """Number of rows so far."""
-        ...
 
     @property
     def oldest_row(self) -> int:
         """Number of the oldest row that is still stored."""
-        ...
+        return 0
 
     @property
     def shown_from(self) -> int:
         """Number of the first row that is sent to a newly opened browser page."""
-        ...
+        return 0
 
+    @abstractmethod
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
         """Rows with numbers from `first` to `last` - 1."""
-        ...
 
     def choose(self, **changes: Any) -> None:
-        """Change settings of measurement or display."""
-        ...
+        """Change settings of measurement or display.
 
-    def say(self, name: str, words: str) -> None:
-        """Send a message to all users."""
-        ...
+        Raises
+        ------
+        DataError, UsageError
+            The choice does not fit the frames.
+        """
+        chosen, unzeroed = self.choices.changed(**changes)
+        self.choices = chosen.for_frames(self.description)
+        if unzeroed:
+            self.say("zero", ZERO_IS_OFF)
 
     def state(self) -> dict[str, Any]:
         """Return the state of source and measurement, for the browser page."""
-        ...
+        description = self.description
+        return {
+            "source": description.name,
+            "kind": description.kind,
+            "width_px": description.width_px,
+            "height_px": description.height_px,
+            "rate_hz": description.rate_hz,
+            "camera": "",
+            "jitter_ms": None,
+            "dropped": 0,
+            "exposure": "",
+            "silent_s": 0.0,
+            "recording": None,
+            "trouble": self.supervisor.trouble,
+            **self.choices.state(),
+        }

@@ -20,7 +20,7 @@ SLOTS = "reference_slots"
 """Key of run.json for the reference slots that were measured in a run on the test bed."""
 
 
-def _document(path: Path) -> Mapping[str, Any]:
+def optional_document(path: Path) -> dict[str, Any]:
     """Content of a JSON document; empty if there is none."""
     try:
         found = json_of(path)
@@ -31,7 +31,7 @@ def _document(path: Path) -> Mapping[str, Any]:
 
 def measurement_beside(table: Path) -> Mapping[str, Any]:
     """Content of the summary beside a gaps.csv; empty for any other table."""
-    return _document(table.parent / SUMMARY) if table.name == GAPS else {}
+    return optional_document(table.parent / SUMMARY) if table.name == GAPS else {}
 
 
 def u_clock_beside(table: Path) -> float:
@@ -118,7 +118,7 @@ def response_note_beside(table: Path) -> tuple[str, ...]:
 
 def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
     """Read the reference slots of the run to which a table belongs; empty without a run or without measured slots."""
-    about = _document(table.parent / RUN)
+    about = optional_document(table.parent / RUN)
     try:
         listed = about.get(SLOTS, []) if table.name in (about["samples"], about.get("joined")) else []
         return tuple(
@@ -131,7 +131,7 @@ def slots_beside(table: Path) -> tuple[ReferenceSlot, ...]:
 
 def recorded_camera(files: Sequence[Path]) -> Mapping[str, str]:
     """Read the camera's settings at the time of a recording that consists of given files; empty without a run.json."""
-    about = _document(files[0].parent / RUN) if len(files) == 1 else {}
+    about = optional_document(files[0].parent / RUN) if len(files) == 1 else {}
     try:
         camera = about["device"]["camera"] if about["video"] == files[0].name else {}
     except (LookupError, TypeError):

@@ -1,8 +1,9 @@
 """Checks of the values in a request, and the response to a request."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from fingervision.domain.errors import FingervisionError, StateError, UsageError
@@ -145,6 +146,37 @@ def words(request: Request, name: str) -> str:
     if isinstance(value, str) and 0 < len(value) <= MOST_LETTERS and value.isprintable():
         return value
     raise UsageError(f"{name} must be a text of 1 to {MOST_LETTERS} letters, but is {shown(value)}.")
+
+
+def one_of(request: Request, name: str, allowed: Sequence[str], called: str) -> str:
+    """Read one of a few words from a request.
+
+    Raises
+    ------
+    UsageError
+        The value is another one.
+    """
+    value = request.get(name)
+    if value not in allowed:
+        raise UsageError(f"{called} must be one of {', '.join(allowed)}, but is {shown(value)}.")
+    return str(value)
+
+
+def file_inside(view: View, request: Request, name: str, called: str) -> Path:
+    """Read the name of a file that a browser page may name: below the program's start folder or the output folder.
+
+    Raises
+    ------
+    UsageError
+        The file lies elsewhere.
+    """
+    path = Path(words(request, name)).resolve()
+    if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
+        raise UsageError(
+            f"{called} must lie inside the folder {Path.cwd()} or {view.out}, but {shown(str(path))} does not: copy "
+            "the file there."
+        )
+    return path
 
 
 def check_scale(view: View, px_per_mm: float, request: Request) -> None:

@@ -1,11 +1,10 @@
 """Requests to the test bed (home, move, jog, run a recipe, stop), which need the option `--allow-motion`."""
 
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fingervision.domain.errors import StateError, UsageError
-from fingervision.live.commands.asking import Answer, Request, number, shown, words
+from fingervision.live.commands.asking import Answer, Request, file_inside, number
 from fingervision.live.view import View
 from fingervision.storage.recipe_toml import read_recipe
 
@@ -61,21 +60,10 @@ def _jog(view: View, request: Request) -> Answer:
 
 def _run(view: View, request: Request) -> Answer:
     bench = _movable(view)
-    recipe = read_recipe(_inside(view, words(request, "recipe")))
+    recipe = read_recipe(file_inside(view, request, "recipe", "A recipe file"))
     out = view.out / f"bed_{datetime.now(UTC).strftime('%Y-%m-%dT%H-%M-%S-%f')}Z"
     bench.run(recipe, out)
     return Answer(f"Running {recipe.name} into {out}.")
-
-
-def _inside(view: View, name: str) -> Path:
-    """Path of a file that a browser page may name: below the program's start folder or the output folder."""
-    path = Path(name).resolve()
-    if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
-        raise UsageError(
-            f"A recipe file must lie inside the folder {Path.cwd()} or {view.out}, but {shown(name)} does "
-            "not: copy the file there."
-        )
-    return path
 
 
 def section(view: View) -> dict[str, Any]:

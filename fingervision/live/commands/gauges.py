@@ -1,6 +1,5 @@
 """Requests about user-defined gauges: open, add, change, remove, load, save."""
 
-from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from math import isfinite
 from typing import Any
@@ -140,7 +139,7 @@ def section(view: View) -> dict[str, Any]:
             "is_saved": board.is_saved,
             "changed_meanwhile": found.is_changed_meanwhile,
             "version": version,
-            "tables": _plain(tables),
+            "tables": [dict(table) for table in tables],
             "first": following.first or 0,
             "frames": following.frames,
             "trouble": following.trouble,
@@ -148,10 +147,6 @@ def section(view: View) -> dict[str, Any]:
             "readings": None if frame is None else following.readings(frame, version),
         }
     }
-
-
-def _plain(tables: list[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    return [dict(table) for table in tables]
 
 
 COMMANDS = {

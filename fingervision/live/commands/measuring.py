@@ -20,7 +20,7 @@ from fingervision.domain.errors import FingervisionError, NoCalibrationError, Ou
 from fingervision.domain.frame import Region
 from fingervision.domain.gap import GapMeasurement
 from fingervision.live.choices import FINGERS
-from fingervision.live.commands.asking import Answer, Request, box, check_scale, number, number_or_none, seen_of, shown
+from fingervision.live.commands.asking import Answer, Request, box, check_scale, number, number_or_none, one_of, seen_of
 from fingervision.live.view import View
 from fingervision.measuring.picture_response import PictureResponse, read_sizes
 from fingervision.measuring.scale import stated_scale
@@ -111,18 +111,13 @@ def _region(view: View, request: Request) -> Answer:
 
 
 def _tips(view: View, request: Request) -> Answer:
-    tips = request.get("tips")
-    if tips not in TIPS:
-        raise UsageError(f"The direction of the tips must be one of {', '.join(TIPS)}, but is {shown(tips)}.")
+    tips = one_of(request, "tips", TIPS, "The direction of the tips")
     view.choose(direction=None if tips == "auto" else Direction(tips))
     return Answer()
 
 
 def _fingers(view: View, request: Request) -> Answer:
-    fingers = request.get("fingers")
-    if str(fingers) not in FINGERS:
-        raise UsageError(f"The brightness of the fingers must be one of {', '.join(FINGERS)}, but is {shown(fingers)}.")
-    view.choose(fingers_are_dark=FINGERS[str(fingers)])
+    view.choose(fingers_are_dark=FINGERS[one_of(request, "fingers", tuple(FINGERS), "The brightness of the fingers")])
     return Answer()
 
 
@@ -175,10 +170,8 @@ def _scale(view: View, request: Request) -> Answer:
 
 
 def _calibrate(view: View, request: Request) -> Answer:
-    kind = request.get("kind")
-    if kind not in ("bar", "slot"):
-        raise UsageError(f"The reference object must be a bar or a slot, but is {shown(kind)}.")
-    seen = seen_reference(view, box(request), str(kind), number(request, "size_mm"), number(request, "u_size_mm"))
+    kind = one_of(request, "kind", ("bar", "slot"), "The reference object")
+    seen = seen_reference(view, box(request), kind, number(request, "size_mm"), number(request, "u_size_mm"))
     references = [*view.features.get(REFERENCES, ()), seen]
     found = calibrated(references, (view.description.width_px, view.description.height_px))
     if request.get("more"):

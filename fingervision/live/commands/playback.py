@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from time import sleep
 from typing import Any
 
 from fingervision.domain.errors import StateError
@@ -16,7 +15,6 @@ from fingervision.live.view import View
 # Measurement of a range of a recording by the command `measure`, whose results are saved.
 
 
-LOOK_EVERY_S = 0.1
 MEASURING = "Measuring a range"
 
 
@@ -67,9 +65,7 @@ class RangeMeasurement:
         self._command.stop()
 
     def _wait(self) -> None:
-        while self._command.exit_code is None:
-            sleep(LOOK_EVERY_S)
-        code, complaint = self._command.exit_code, self._command.complaint
+        code, complaint = self._command.ended()
         if code not in WHOLE:
             self._playback.supervisor.alarm(MEASURING, complaint or f"Measuring ended with exit code {code}.")
         else:

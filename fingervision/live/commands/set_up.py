@@ -1,6 +1,5 @@
 """Requests about the set-up: findings with remedies, focus and light, uncertainty budget, saved settings."""
 
-from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
@@ -9,14 +8,14 @@ import numpy as np
 from calib.calibration import is_stated
 from calib.measured_scale import Calibration
 from fingervision.domain.direction import Direction
-from fingervision.domain.errors import StateError, UsageError
+from fingervision.domain.errors import StateError
 from fingervision.domain.frame import Frame, Region
 from fingervision.domain.gap import GapMeasurement
 from fingervision.inspection.catalogue import inspect
 from fingervision.inspection.report import as_json
 from fingervision.inspection.sample import take_sample
 from fingervision.live.choices import FINGERS
-from fingervision.live.commands.asking import Answer, Request, check_scale, shown, words
+from fingervision.live.commands.asking import Answer, Request, check_scale, file_inside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.view import View
 from fingervision.measuring.gap_budget import gap_budget
@@ -124,11 +123,7 @@ def _save(view: View, request: Request) -> Answer:
 
 
 def _load(view: View, request: Request) -> Answer:
-    path = Path(words(request, "path")).resolve()
-    if not any(path.is_relative_to(folder.resolve()) for folder in (Path.cwd(), view.out)):
-        raise UsageError(
-            f"A settings file must lie inside the folder {Path.cwd()} or {view.out}, but {shown(str(path))} does not."
-        )
+    path = file_inside(view, request, "path", "A settings file")
     found = read_settings(path)
     changes: dict[str, Any] = {}
     if "calibration" in found:

@@ -35,7 +35,6 @@ LEAST_SHARE = 0.02
 MORE_ROWS, MORE_AT_REST = 1.5, 1.1
 # Largest number of rows in a diagnosis, the newest two minutes at 25 frames per second; more rows would take longer.
 MOST_ROWS = 3000
-LOOK_EVERY_S = 0.1
 VERDICT = "Seeking a verdict"
 COLUMNS = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
 
@@ -131,9 +130,7 @@ class VerdictSeeker:
             write_table(table, rows)
         arguments = ("diagnose", str(table), "--model", str(self._model), "--kind", self._kind, "--out", str(folder))
         command = BackgroundCommand(*arguments)
-        while command.exit_code is None and not self._ending.wait(LOOK_EVERY_S):
-            pass
-        code, complaint = command.exit_code, command.complaint
+        code, complaint = command.ended(self._ending)
         command.stop()
         if code is None:
             return

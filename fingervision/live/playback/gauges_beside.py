@@ -1,37 +1,17 @@
 """Gauges in the browser page: the list that the user edits, and the measurement of the listed gauges."""
 
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING
 
 from fingervision.live.playback.gauge_board import GaugeBoard
 from fingervision.live.playback.gauge_following import GaugeFollowing
 from fingervision.live.playback.playback import Playback
 
+if TYPE_CHECKING:
+    from fingervision.live.live_gauges import LiveGauges
+
 GAUGES = "gauges"
 """Name of this addition in the features of a view."""
-
-
-class Follows(Protocol):
-    """Protocol of a class that measures the gauges of a gauge board in the frames of a recording or a camera."""
-
-    @property
-    def first(self) -> int | None:
-        """Number of the frame in which gauges are drawn."""
-        ...
-
-    @property
-    def frames(self) -> int:
-        """Number of frames measured so far."""
-        ...
-
-    @property
-    def trouble(self) -> str:
-        """Reason why the gauges have no readings; empty if they have readings."""
-        ...
-
-    def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
-        """Readings in a frame of a given version of the gauges; None if unknown."""
-        ...
 
 
 class GaugesBeside:
@@ -41,15 +21,17 @@ class GaugesBeside:
     ----------
     board : GaugeBoard
         The gauges and their file.
-    following : Follows
-        Measurement of the gauges.
+    following : GaugeFollowing or LiveGauges
+        Measurement of the gauges in the frames of a recording or a camera.
     is_asked_for : bool
         Whether the user requested gauges on the command line, so that the panel is open from the beginning.
     is_live : bool
         Whether the frames come from a continuous source, in which gauges can be drawn in any frame.
     """
 
-    def __init__(self, board: GaugeBoard, following: Follows, *, is_asked_for: bool, is_live: bool = False) -> None:
+    def __init__(
+        self, board: GaugeBoard, following: "GaugeFollowing | LiveGauges", *, is_asked_for: bool, is_live: bool = False
+    ) -> None:
         self.board, self.following = board, following
         self.is_asked_for, self.is_live = is_asked_for, is_live
         self.is_changed_meanwhile = False

@@ -1,8 +1,7 @@
 """A recording in the browser page: display of frames while the recording is measured in the background."""
 
-import secrets
 from bisect import bisect_left
-from collections import Counter, OrderedDict, deque
+from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from threading import Condition, Event, Thread
@@ -14,13 +13,11 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.own_process import in_own_process
 from fingervision.domain.status import Status
 from fingervision.frames.seeking import Seeking, frame_times_s, seeking
-from fingervision.frames.source import Description
-from fingervision.live.choices import MOVES_ZERO, ZERO_IS_OFF
-from fingervision.live.frame_measurement import Seen
+from fingervision.live.choices import MOVES_ZERO
 from fingervision.live.playback.recorded import Recorded, recorded_frame
 from fingervision.live.playback.track import Track, arguments_of
-from fingervision.live.supervisor import Supervisor, told
-from fingervision.live.view import Message, MessageListener, Messages
+from fingervision.live.supervisor import told
+from fingervision.live.view import View
 from fingervision.measuring.marked import marked
 from fingervision.storage.gaps_csv import TIME_PLACES, GapRow
 from fingervision.storage.run_files import lost_frames
@@ -123,7 +120,7 @@ NO_PICTURE = (Status.DAMAGED, Status.DUPLICATE)
 PLAYING, MEASURING = "Playing the recording", "Measuring the recording"
 
 
-class Playback:
+class Playback(View):
     """Plays a recording in a separate thread.
 
     Parameters
@@ -135,13 +132,9 @@ class Playback:
     """
 
     def __init__(self, opened: Recorded, out: Path) -> None:
-        self.recorded, self.out = opened, out
-        self.description: Description = opened.source.description
-        self.choices = opened.choices.for_frames(self.description)
-        self.features: dict[str, Any] = {}
-        self.seen: Seen | None = None
+        super().__init__(opened.source.description, opened.choices, out)
+        self.recorded = opened
         self.range: tuple[int, int] | None = None
-        self.supervisor = Supervisor(self.say)
         self.on_table: Callable[[Sequence[GapRow]], None] = lambda rows: None
         """Function that is called with all rows whenever the table of the recording is complete."""
         self.on_stop: list[Callable[[], None]] = []
@@ -150,10 +143,7 @@ class Playback:
         """Recordings that are measured with the same settings."""
         self._told: Track | None = None
         self.is_playing, self.speed, self.frame = False, 1.0, 0
-        self._messages = Messages()
         self._track: Track | None = None
-        self._generation = 0
-        self._identity = secrets.token_hex(4)
         marks = lost_frames(self.description.files)
         self._is_marked = bool(marks)
         source = opened.source
@@ -251,41 +241,13 @@ class Playback:
         DataError, UsageError
             The choice does not fit the recording's frames.
         """
-        chosen, unzeroed = self.choices.changed(**changes)
-        self.choices = chosen.for_frames(self.description)
-        if unzeroed:
-            self.say("zero", ZERO_IS_OFF)
+        super().choose(**changes)
         for each in self.companions:
             each.choose(**changes)
         if MOVES_ZERO & set(changes):
             self._measure_anew()
 
-    def renew(self) -> None:
-        """Send all rows to the browser pages again, because what stands beside them has changed."""
-        self._generation += 1
-
     # ---- data for the browser page
-    @property
-    def identity(self) -> str:
-        """Number that changes when the measurement of the recording is restarted."""
-        return f"{self._identity}-{self._generation}"
-
-    @property
-    def messages(self) -> deque[Message]:
-        """The most recent messages."""
-        return self._messages.kept
-
-    @property
-    def on_message(self) -> list[MessageListener]:
-        """Listeners that receive every message."""
-        return self._messages.listeners
-
-    def say(self, name: str, words: str) -> None:
-        """Send a message to all users."""
-        self._messages.say(name, words)
-
-    in_a_hurry = False
-
     @property
     def time_s(self) -> float:
         """Time of the displayed frame (s)."""
@@ -303,8 +265,6 @@ class Playback:
         track = self._track
         return 0 if track is None else len(track.rows)
 
-    oldest_row = shown_from = 0
-
     def rows(self, first: int, last: int) -> Iterator[GapRow]:
         """Rows of the table for the frames from `first` to `last` - 1."""
         track = self._track
@@ -319,26 +279,13 @@ class Playback:
 
     def state(self) -> dict[str, Any]:
         """Return the state of the playback, for the browser page."""
-        description = self.description
         counts: Counter[Status] = Counter() if self._track is None else self._track.counts
         return {
-            "source": description.name,
-            "kind": description.kind,
+            **super().state(),
             "whole": True,
-            "width_px": description.width_px,
-            "height_px": description.height_px,
-            "rate_hz": description.rate_hz,
-            "camera": "",
-            "jitter_ms": None,
-            "dropped": 0,
             "duplicates": counts[Status.DUPLICATE],
             "damaged": counts[Status.DAMAGED],
-            "exposure": "",
-            "silent_s": 0.0,
             "ended": bool(self.supervisor.trouble_of(PLAYING)),
-            "trouble": self.supervisor.trouble,
-            "recording": None,
-            **self.choices.state(),
         }
 
     @property
@@ -355,7 +302,7 @@ class Playback:
             if self.choices.scale is not None:
                 arguments = arguments_of(self.recorded.name, self.choices, self.recorded.options)
                 self._track = Track(arguments)
-            self._generation += 1
+            self.renew()
             self._shown = None
             self.supervisor.clear(MEASURING)
             self._changed.notify_all()
@@ -405,7 +352,7 @@ class Playback:
         if track is None:
             return
         if track.refresh():
-            self._generation += 1
+            self.renew()
         if track.failure and not track.is_whole:
             self.supervisor.alarm(MEASURING, track.failure)
         if track.is_whole and self._told is not track:

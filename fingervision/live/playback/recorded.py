@@ -14,9 +14,9 @@ from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.frames.source import Description, FrameSource, Wish, open_source
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import FrameMeasurement, Seen
+from fingervision.storage.beside import optional_document
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.storage.plain_file import json_of
 from fingervision.storage.run_files import RUN
 
 # One frame of a recording with its table row, and with a separate measurement of this frame.
@@ -114,7 +114,7 @@ def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[st
     """
     path = Path(name)
     folder = path if path.is_dir() else path.parent
-    about = _about(folder)
+    about = optional_document(folder / RUN)
     video = about.get("video")
     if path.is_dir() and about:
         if not isinstance(video, str) or not (folder / video).is_file():
@@ -130,14 +130,6 @@ def recorded(name: str, rate_hz: float | None, choices: Choices, drive: tuple[st
         drive = ("--drive", str(folder / samples), "--drive-offset-s", "0")
     rate = () if rate_hz is None else ("--rate-hz", repr(rate_hz))
     return Recorded(name, open_source(name, Wish(rate_hz=rate_hz)), choices, (*rate, *drive))
-
-
-def _about(folder: Path) -> dict[str, Any]:
-    try:
-        about = json_of(folder / RUN)
-    except (OSError, ValueError):
-        return {}
-    return about if isinstance(about, dict) else {}
 
 
 def _as_in_run(folder: Path, about: dict[str, Any], choices: Choices) -> Choices:
