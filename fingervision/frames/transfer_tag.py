@@ -1,7 +1,6 @@
 """The camera's transfer curve as stated by a tag in the recording."""
 
 import struct
-from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -16,8 +15,8 @@ VIDEO_TAGS = {1: "bt709", 6: "bt709", 8: "linear", 13: "srgb", 14: "bt709", 15: 
 # PyAV's number of the limited colour range (ITU-T H.273, 8.3: VideoFullRangeFlag is 0).
 STUDIO_RANGE = 1
 LUMA_FORMATS = ("yuv", "yuyv", "uyvy", "yvyu", "nv", "p0", "p2", "p4", "gray", "y2")
-# PNG stores 100000 / gamma of the file (PNG specification, 11.3.3.2).
-PNG_GAMMAS = {45455: "srgb", 100000: "linear"}
+# A PNG picture states sRGB, or a power (PNG specification, 11.3.3.2), of which 1/2.2 stands for sRGB.
+IMAGE_TAGS = VIDEO_TAGS | {4: "srgb"}
 EXIF_START, EXIF_IFD, COLOUR_SPACE = b"Exif\x00\x00", 0x8769, 0xA001
 # Number of bytes at the start of a file that are searched for tags, which precede the pixels.
 HEAD_BYTES = 1 << 16
@@ -38,11 +37,9 @@ def transfer_tag(files: tuple[Path, ...]) -> str | None:
             head = file.read(HEAD_BYTES)
     except OSError:
         return None
-    if head.startswith(PNG_SIGNATURE):
-        return _of_png(head)
     if head.startswith(JPEG_START):
         return _of_jpeg(head)
-    if len(files) > 1:
+    if len(files) > 1 and not head.startswith(PNG_SIGNATURE):
         return None
     try:
         return _of_container(files[0], files[0].stat().st_mtime_ns)
@@ -63,30 +60,9 @@ def _of_video(codec: av.VideoCodecContext) -> str | None:
 
     Only luma has a limited (studio) range; a video that states no range is assumed to use the full range.
     """
-    name = VIDEO_TAGS.get(int(codec.color_trc))
+    name = (IMAGE_TAGS if codec.name == "png" else VIDEO_TAGS).get(int(codec.color_trc))
     is_luma = (codec.pix_fmt or "").startswith(LUMA_FORMATS)
     return f"{name}_studio" if name in STUDIO and is_luma and int(codec.color_range) == STUDIO_RANGE else name
-
-
-def _of_png(head: bytes) -> str | None:
-    gamma = None
-    for kind, body in _chunks(head):
-        if kind == b"sRGB":
-            return "srgb"
-        if kind == b"gAMA" and len(body) == 4:
-            gamma = PNG_GAMMAS.get(struct.unpack(">I", body)[0])
-    return gamma
-
-
-def _chunks(head: bytes) -> Iterator[tuple[bytes, bytes]]:
-    place = len(PNG_SIGNATURE)
-    while place + 8 <= len(head):
-        (length,) = struct.unpack_from(">I", head, place)
-        kind = head[place + 4 : place + 8]
-        if kind == b"IDAT":
-            return
-        yield kind, head[place + 8 : place + 8 + length]
-        place += length + 12
 
 
 def _of_jpeg(head: bytes) -> str | None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from calib.calibration import is_stated
 from calib.measured_scale import Calibration
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import UsageError
@@ -139,6 +140,19 @@ class Choices:
         if gap_mm + guard_mm < low or gap_mm - guard_mm > high:
             return "fail"
         return "pass" if low <= gap_mm - guard_mm and gap_mm + guard_mm <= high else "unsure"
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings of the measurement as a settings file states them; None for what is not stated."""
+        region, bare = self.region, self.scale if self.scale_file is None else None
+        return {
+            "calibration": self.scale_file,
+            "px_per_mm": None if bare is None else bare.px_per_mm,
+            "u_px_per_mm": bare.u_px_per_mm if isinstance(bare, Calibration) and is_stated(bare) else None,
+            "below_tip_mm": self.below_tip_mm,
+            "tips": "auto" if self.direction is None else self.direction.value,
+            "fingers": self.fingers,
+            "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
+        }
 
     def state(self) -> dict[str, Any]:
         """Return scale, region, height, zero and tolerance, for the browser page."""

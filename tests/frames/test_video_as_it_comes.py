@@ -1,9 +1,11 @@
 """Videos as written by phones and cameras: sound, several tracks, cover pictures, high dynamic range, uneven times."""
 
+import zlib
 from fractions import Fraction
 from pathlib import Path
 
 import av
+import cv2
 import numpy as np
 import pytest
 
@@ -107,3 +109,23 @@ def test_curves_of_high_dynamic_range_are_those_of_the_standard() -> None:
     # BT.2408: 203 cd/m2 is a PQ signal of 58 %; its OOTF was worked out by hand: (203/100)^(1/2.4) = 1.343.
     light = ((1.343 + 0.0993) / 1.0993) ** (1.0 / 0.45) / 59.5208
     assert np.interp(0.5807, pq.level, pq.light) == pytest.approx(light, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "body", "name"),
+    [
+        (b"sRGB", b"\0", "srgb"),
+        (b"gAMA", (45455).to_bytes(4, "big"), "srgb"),
+        (b"gAMA", (100000).to_bytes(4, "big"), "linear"),
+        (b"gAMA", (50000).to_bytes(4, "big"), None),
+        (b"tEXt", b"Title\0none", None),
+    ],
+)
+def test_a_png_picture_states_its_curve(kind: bytes, body: bytes, name: str | None, tmp_path: Path) -> None:
+    png = cv2.imencode(".png", np.full((48, 64), 128, np.uint8))[1].tobytes()
+    behind_head = 33  # the signature, and the chunk IHDR
+    chunk = len(body).to_bytes(4, "big") + kind + body + zlib.crc32(kind + body).to_bytes(4, "big")
+    files = (tmp_path / "1.png", tmp_path / "2.png")
+    for file in files:
+        file.write_bytes(png[:behind_head] + chunk + png[behind_head:])
+    assert transfer_tag(files) == transfer_tag(files[:1]) == name

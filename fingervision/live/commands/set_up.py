@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from calib.calibration import is_stated
 from calib.measured_scale import Calibration
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import StateError
@@ -105,20 +104,8 @@ def _inspect(view: View, request: Request) -> Answer:
 
 
 def _save(view: View, request: Request) -> Answer:
-    path, choices = view.out / FILE, view.choices
-    region, scale = choices.region, choices.scale
-    write_settings(
-        path,
-        {
-            "calibration": choices.scale_file,
-            "px_per_mm": None if scale is None or choices.scale_file is not None else scale.px_per_mm,
-            "u_px_per_mm": scale.u_px_per_mm if isinstance(scale, Calibration) and is_stated(scale) else None,
-            "below_tip_mm": choices.below_tip_mm,
-            "tips": "auto" if choices.direction is None else choices.direction.value,
-            "roi": None if region is None else [region.x_px, region.y_px, region.width_px, region.height_px],
-            "fingers": choices.fingers,
-        },
-    )
+    path = view.out / FILE
+    write_settings(path, view.choices.settings())
     return Answer(f"Settings written to {path}; `measure`, `live`, `inspect` and this page take them.")
 
 

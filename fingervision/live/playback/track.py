@@ -4,8 +4,6 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from calib.calibration import is_stated
-from calib.measured_scale import Calibration
 from fingervision.domain.status import Status
 from fingervision.live.background import WAITED_FOR, BackgroundCommand
 from fingervision.live.choices import Choices
@@ -28,21 +26,12 @@ def arguments_of(recording: str, choices: Choices, more: tuple[str, ...]) -> tup
     more : tuple of str
         Options that belong to the recording, such as a frame rate or a drive log.
     """
-    region, scale = choices.region, choices.scale
-    assert scale is not None  # noqa: S101 - asked before
-    given: tuple[str, ...] = ("--px-per-mm", repr(scale.px_per_mm))
-    if isinstance(scale, Calibration) and is_stated(scale):
-        given += ("--u-px-per-mm", repr(scale.u_px_per_mm))
-    if choices.scale_file is not None:
-        given = ("--calibration", str(choices.scale_file))
-    where: tuple[str, ...] = ("--below-tip-mm", repr(choices.below_tip_mm))
-    if choices.direction is not None:
-        where += ("--tips", choices.direction.value)
-    if choices.fingers_are_dark is not None:
-        where += ("--fingers", "dark" if choices.fingers_are_dark else "light")
-    if region is not None:
-        where += ("--roi", f"{region.x_px},{region.y_px},{region.width_px},{region.height_px}")
-    return ("measure", recording, *given, *where, *more)
+    given: list[str] = []
+    for name, value in choices.settings().items():
+        if value not in (None, "auto"):
+            words = ",".join(map(str, value)) if isinstance(value, list) else str(value)
+            given += [f"--{name.replace('_', '-')}", words]
+    return ("measure", recording, *given, *more)
 
 
 class Track:
