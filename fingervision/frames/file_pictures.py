@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.frames.damage import DamageTrail, Picture
-from fingervision.frames.matroska_checksums import BROKEN, UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.missing_references import OWN_RECORDING, is_shown, missing_references
 from fingervision.frames.mp4_durations import NO_SCALE, states_another_duration
 from fingervision.frames.open_container import Heard, listening, open_container
 from fingervision.frames.sound_jpeg import SoundJpeg
 from fingervision.frames.stream_losses import StreamLosses
+from fingervision.frames.unchecked_codecs import BROKEN, UNCHECKED_CODECS, ClusterChecksums
 
 
 def cut_off(

@@ -17,14 +17,9 @@ Source: ISO/IEC 14496-12, 8.4.2 (`mdhd`), 8.6 (`stts`, `ctts`, `elst`), 8.7.3 (`
 import mmap
 import struct
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import accumulate, chain, repeat
 from pathlib import Path
-
-import av
-
-from fingervision.frames.open_container import listening, open_container
 
 # Boxes of an MP4 or QuickTime file, and the tables in them.
 #
@@ -75,8 +70,6 @@ def rows(content: mmap.mmap, place: tuple[int, int], form: str) -> list[tuple[in
     return list(struct.iter_unpack(form, content[begin + 8 : last]))
 
 
-GIVES_UP = "error reading header"
-"""Message of FFmpeg's MP4 reader when it stops reading a header (libavformat/mov.c, mov_read_header)."""
 MOST_ENTRIES = 4
 """Largest number of rows of a table for a constant rate. Longer tables are not searched for a single damaged byte that
 would explain a difference, because among many bytes such a byte is always found.
@@ -134,8 +127,6 @@ def states_another_duration(path: Path) -> bool:
         An MP4 or QuickTime file.
     """
     try:
-        if _is_unread(path):
-            return True
         with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
             found = list(boxes(content, 0, len(content)))
             if any(name in (b"moof", b"mvex") for name, _, _ in found):
@@ -148,13 +139,6 @@ def states_another_duration(path: Path) -> bool:
         return True  # a table ends before its last row, or states impossible values
     film_scale = films[0][0] if films else 0
     return any(_contradicts(track, film_scale) for track in tracks)
-
-
-def _is_unread(path: Path) -> bool:
-    """Whether FFmpeg stops reading within the table of contents, and continues with an incomplete table."""
-    with listening("") as heard, suppress(av.FFmpegError, IndexError), open_container(path):
-        return any(GIVES_UP in words for _, _, words in heard.log)
-    return False
 
 
 def _contradicts(track: _Track, film_scale: int) -> bool:

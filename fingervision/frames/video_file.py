@@ -17,10 +17,9 @@ from fingervision.frames.damage import DamageTrail, believable
 from fingervision.frames.decoded_picture import EXPORTED, StepTrail, luma
 from fingervision.frames.file_pictures import pictures
 from fingervision.frames.image_file import IMAGE_SUFFIXES
-from fingervision.frames.matroska_checksums import UNCHECKED_CODECS, ClusterChecksums
 from fingervision.frames.open_container import STRICT, open_container
 from fingervision.frames.source import Description, Wish
-from fingervision.frames.unseen_damage import unseen_damage
+from fingervision.frames.unchecked_codecs import UNCHECKED_CODECS, ClusterChecksums, unseen_damage
 
 # FFmpeg's AV_CODEC_PROP_INTRA_ONLY and AV_CODEC_PROP_LOSSY. A codec with both a lossy and a lossless mode (H.264)
 # counts as lossy, because the stream does not state its mode.

@@ -12,8 +12,7 @@ from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.gauges.reading import unread
 from fingervision.live.playback.gauge_board import GaugeBoard
-from fingervision.live.playback.gauge_following import FOLLOWING, NO_SCALE, told
-from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside
+from fingervision.live.playback.gauge_following import FOLLOWING, GAUGES, NO_SCALE, GaugesBeside, told
 from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 

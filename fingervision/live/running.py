@@ -20,7 +20,7 @@ from fingervision.live.access import Access
 from fingervision.live.beside import Beside, compared, stand_beside
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices
-from fingervision.live.playback.gauges_beside import put_gauges_beside
+from fingervision.live.playback.gauge_following import put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import Recorded
 from fingervision.live.playback.second_recording import beside_recording

@@ -22,7 +22,7 @@ from fingervision.live.choices import Choices
 from fingervision.live.commands import obey, section
 from fingervision.live.commands.gauges import settings_of
 from fingervision.live.playback.gauge_board import ChangedMeanwhileError, FieldError
-from fingervision.live.playback.gauges_beside import GaugesBeside, put_gauges_beside
+from fingervision.live.playback.gauge_following import GaugesBeside, put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
 from tests.gauges.drawn import bar, drawn, half_plane, seen

@@ -11,7 +11,7 @@ from fingervision.gauges.kinds import kind_named, kinds
 from fingervision.live.commands.asking import GREATEST, MOST_LETTERS, Answer, Request, shown, words
 from fingervision.live.live_gauges import put_live_gauges
 from fingervision.live.playback.gauge_board import USUAL_FILE, ChangedMeanwhileError, FieldError, GaugeBoard
-from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside, put_gauges_beside
+from fingervision.live.playback.gauge_following import GAUGES, GaugesBeside, put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.session import Session
 from fingervision.live.view import View

@@ -7,7 +7,7 @@ from typing import Any
 from fingervision.domain.errors import StateError
 from fingervision.live.background import WAITED_FOR, BackgroundCommand
 from fingervision.live.commands.asking import Answer, Request, number, whole
-from fingervision.live.playback.gauges_beside import GAUGES, GaugesBeside
+from fingervision.live.playback.gauge_following import GAUGES, GaugesBeside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.track import WHOLE, arguments_of
 from fingervision.live.view import View

@@ -1,10 +1,11 @@
-"""Measurement of gauges from the first to the displayed frame, with the same results as `measure --gauges`."""
+"""Gauges of a recording in the page: measured from the first to the displayed frame, as by `measure --gauges`."""
 
 import json
 import zlib
 from collections.abc import Sequence
+from pathlib import Path
 from threading import Event, Thread
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fingervision.domain.errors import StateError
 from fingervision.domain.frame import LostFrame
@@ -22,6 +23,11 @@ from fingervision.measuring.marked import marked
 from fingervision.measuring.task import Task
 from fingervision.storage.run_files import lost_frames
 
+if TYPE_CHECKING:
+    from fingervision.live.live_gauges import LiveGauges
+
+GAUGES = "gauges"
+"""Name of the gauges in the features of a view."""
 LOOK_EVERY_S = 0.02
 # Number of frames that are measured ahead of the displayed frame, so that the next readings are ready at once.
 AHEAD_FRAMES = 25
@@ -161,3 +167,45 @@ def told(gauges: Sequence[Gauge], readings: Sequence[Reading], plane: PlaneScale
 
 def _points(mark: Mark | None) -> list[tuple[float, float]]:
     return [] if mark is None else [(round(float(x), 2), round(float(y), 2)) for x, y in mark.points_px]
+
+
+class GaugesBeside:
+    """Data for the gauge panel in the browser page.
+
+    Parameters
+    ----------
+    board : GaugeBoard
+        The gauges and their file.
+    following : GaugeFollowing or LiveGauges
+        Measurement of the gauges in the frames of a recording or a camera.
+    is_asked_for : bool
+        Whether the user requested gauges on the command line, so that the panel is open from the beginning.
+    is_live : bool
+        Whether the frames come from a continuous source, in which gauges can be drawn in any frame.
+    """
+
+    def __init__(
+        self, board: GaugeBoard, following: "GaugeFollowing | LiveGauges", *, is_asked_for: bool, is_live: bool = False
+    ) -> None:
+        self.board, self.following = board, following
+        self.is_asked_for, self.is_live = is_asked_for, is_live
+        self.is_changed_meanwhile = False
+        """Whether the last request to save failed because another program had changed the file."""
+
+
+def put_gauges_beside(playback: Playback, path: Path, *, is_asked_for: bool = False) -> GaugesBeside:
+    """Add gauges to the playback of a recording, and start to measure them.
+
+    Raises
+    ------
+    DataError, InputFileError
+        The file exists but cannot be read, or its gauges do not fit these frames.
+    """
+    description = playback.description
+    board = GaugeBoard(path, (description.width_px, description.height_px))
+    following = GaugeFollowing(playback, board)
+    beside = GaugesBeside(board, following, is_asked_for=is_asked_for)
+    playback.features[GAUGES] = beside
+    playback.on_stop.append(following.stop)
+    following.start()
+    return beside

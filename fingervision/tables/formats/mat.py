@@ -9,9 +9,8 @@ import numpy as np
 from fingervision.domain.errors import DataError
 from fingervision.domain.needed_library import needed_library
 from fingervision.tables.mapping import Entry
-from fingervision.tables.parts import chosen_part
+from fingervision.tables.parts import WIDEST, chosen_part, is_numeric, tables_of
 from fingervision.tables.raw_table import RawTable
-from fingervision.tables.vectors import WIDEST, is_numeric, tables_of
 
 ORDER = 30
 IN_OWN_PROCESS = True

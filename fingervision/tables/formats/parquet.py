@@ -9,8 +9,8 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.needed_library import needed_library
 from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.mapping import Entry
+from fingervision.tables.parts import numbers
 from fingervision.tables.raw_table import RawColumn, RawTable
-from fingervision.tables.vectors import numbers
 
 ORDER = 40
 IN_OWN_PROCESS = True

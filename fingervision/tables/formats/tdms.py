@@ -12,10 +12,9 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.needed_library import needed_library
 from fingervision.storage.csv_columns import Numbers
 from fingervision.tables.mapping import Entry
-from fingervision.tables.parts import chosen_part
+from fingervision.tables.parts import chosen_part, numbers
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.units import column_name
-from fingervision.tables.vectors import numbers
 
 ORDER = 50
 MOST_VALUES = 50_000_000
