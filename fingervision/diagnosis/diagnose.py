@@ -25,7 +25,6 @@ from fingervision.diagnosis.inference.verdict import judged, without_names
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
-from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.diagnosis.report.diagnosis_report import diagnosis_report
 from fingervision.diagnosis.report.positioning_of_data import PositioningReport, positioning_of_data
 from fingervision.domain.effect import Array
@@ -100,10 +99,8 @@ def _over_the_ends(state: Searched, look: Look) -> Searched:
     data, found = state.data.with_overshoots(), state.found
     if data is state.data:
         return state
-    history, drawn = found.problem.chain.history, found.problem.whitener.drawing
-    curve_mm = map_columns(found.problem.chain, set_points(history)) * history.input_span_mm
-    beside = np.hstack([curve_mm, *([] if drawn is None else [drawn])])
-    problem = replace(found.problem, offsets=RunOffsets.of(replace(found.problem.whitener, drawing=beside)))
+    history = found.problem.chain.history
+    problem = found.problem.beside(map_columns(found.problem.chain, set_points(history)) * history.input_span_mm)
     along = _with_memory_score(replace(problem, chain=data.chain), found)
     return look.again(data) if along < _with_memory_score(problem, found) - LEAST_GAIN else state
 

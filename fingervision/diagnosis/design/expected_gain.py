@@ -13,7 +13,6 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.channel_noises import SHORT_RUN
 from fingervision.diagnosis.noise.noise_model import Noise, without_input
 from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
-from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array
 
 
@@ -39,8 +38,7 @@ def problems_of_drawn_noise(
         Generator for the draws.
     """
     for noises in _noises(data, problem, explanation, count, rng):
-        whitener = replace(problem.whitener, noises=noises)
-        yield replace(problem, whitener=whitener, measured=whitener.one(data.aim_mm), offsets=RunOffsets.of(whitener))
+        yield problem.judged_by(replace(problem.whitener, noises=noises), data.aim_mm)
 
 
 def _noises(

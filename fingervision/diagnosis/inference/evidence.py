@@ -121,9 +121,7 @@ def follows_the_input(problem: Problem, one: Explanation, base: Explanation) -> 
 
 def detection_limits(problem: Problem, atoms: Signatures, nothing: Explanation) -> dict[str, dict[str, object]]:
     """Compute the detection limit of each effect: its size whose odds against no effect are nearly always 20 to 1."""
-    metric = problem.offsets.metric(nothing.sigma_mm)
-    shared = problem.offsets.design.T @ atoms.columns
-    norm = np.einsum("ij,ij->j", atoms.columns, atoms.columns) - np.einsum("ij,ij->j", shared, metric @ shared)
+    norm = atoms.columns.lengths(problem.offsets.metric(nothing.sigma_mm))
     out: dict[str, dict[str, object]] = {}
     for name in problem.effects:
         listed = [parameter for _, parameter in problem.parameters((name,)) if parameter.run is None]

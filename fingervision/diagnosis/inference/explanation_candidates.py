@@ -6,7 +6,7 @@ from itertools import permutations
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import fit, scan
+from fingervision.diagnosis.inference.hypothesis_fit import fit, refit, scan
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
@@ -39,7 +39,7 @@ SWAPS_REFITTED = 24
 def single_effects(problem: Problem, atoms: Signatures, iterations: int, begins: int = BEGINS) -> list[Explanation]:
     """Fit each effect alone, from its most promising signatures; best first."""
     nothing = problem.nothing()
-    gain, coefficient = atoms.gains(nothing.residual, problem.offsets, problem.offsets.metric(nothing.sigma_mm))
+    gain, coefficient = atoms.gains(nothing, tangents(problem, nothing))
     owner = np.array(atoms.names)
     found = []
     for name in problem.effects:
@@ -99,8 +99,7 @@ def extended(
     planned: list[tuple[float, Explanation, str, dict[str, float]]] = []
     scanned = scanned if problem.chain.history.input_mm.size <= LONG else 1
     for place, base in enumerate(bases):
-        metric = problem.offsets.metric(base.sigma_mm)
-        gain, coefficient = atoms.gains(base.residual, problem.offsets, metric, tangents(problem, base))
+        gain, coefficient = atoms.gains(base, tangents(problem, base))
         for name in problem.effects:
             mine = np.flatnonzero(owner == name)
             if name in base.names or not mine.size:
@@ -122,7 +121,7 @@ def extended(
         progress((index + 1) / most)
     ranked = sorted(found.values(), key=lambda explanation: explanation.score)
     return sorted(
-        [fit(problem, e.names, e.values, iterations=20) for e in ranked[:refined]] + ranked[refined:],
+        [refit(problem, e) for e in ranked[:refined]] + ranked[refined:],
         key=lambda e: e.score,
     )
 

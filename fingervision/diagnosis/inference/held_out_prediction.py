@@ -10,7 +10,6 @@ from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array, Flags
 
 WORSE = 1.02
@@ -111,11 +110,8 @@ def _on_unseen(data: Observations, problem: Problem, explanation: Explanation, h
 def _predicted(data: Observations, problem: Problem, explanation: Explanation, hidden: Flags) -> Array:
     """Prediction of all rows by effects, and by a map, that are fitted without some hidden rows; shape (m,)."""
     aside = problem.whitener.aside | np.tile(hidden, problem.whitener.aside.size // hidden.size)
-    whitener = replace(problem.whitener, aside=aside)
-    rest = replace(problem, whitener=whitener, measured=whitener.one(data.aim_mm), offsets=RunOffsets.of(whitener))
-    fitted = rest.nothing()
-    if explanation.names:
-        fitted = fit(rest, explanation.names, explanation.values, sigma_mm=explanation.sigma_mm, iterations=STEPS)
+    rest = problem.judged_by(replace(problem.whitener, aside=aside), data.aim_mm)
+    fitted = fit(rest, explanation.names, explanation.values, sigma_mm=explanation.sigma_mm, iterations=STEPS)
     predicted = data.chain.stacked(fitted.values)
     curve = data.position_map
     if curve is None:

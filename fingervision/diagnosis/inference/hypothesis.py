@@ -108,6 +108,21 @@ class Problem:
         """Return the problem with another noise or other outliers; `aim_mm` of shape (m,) is the target."""
         return replace(self, whitener=whitener, measured=whitener.one(aim_mm), offsets=RunOffsets.of(whitener))
 
+    def beside(self, columns_mm: Array) -> "Problem":
+        """Return the problem with further columns of random effects, which come first; shape (m, k) (mm)."""
+        drawn = self.whitener.drawing
+        columns = columns_mm if drawn is None else np.hstack([columns_mm, drawn])
+        return self.with_drawing(columns)
+
+    def without_first(self, count: int) -> "Problem":
+        """Return the problem without the first columns of its random effects."""
+        drawn = self.whitener.drawing
+        return self.with_drawing(None if drawn is None or drawn.shape[1] == count else drawn[:, count:])
+
+    def with_drawing(self, columns_mm: Array | None) -> "Problem":
+        """Return the problem with other columns of random effects."""
+        return replace(self, offsets=RunOffsets.of(replace(self.whitener, drawing=columns_mm)))
+
     def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:
         """Parameters of given effects, with bounds narrowed to the range that the data can show."""
         found: list[tuple[str, Parameter]] = []
@@ -133,11 +148,12 @@ class Problem:
         """Predict all channels with given parameters, and whiten the prediction; the result has shape (m,)."""
         return self.whitener.one(self.chain.stacked(settings))
 
-    def score(self, settings: Mapping[str, Mapping[str, float]]) -> float:
-        """Score of given parameter values: chi-square with the best run offsets, plus the penalty of these offsets."""
-        residual = self.measured - self.whitened(settings)
+    def judged(self, explanation: Explanation, values: Mapping[str, Mapping[str, float]]) -> Explanation:
+        """Give an explanation other parameter values, without a refit, and the score that they have here."""
+        residual = self.measured - self.whitened(values)
         sigma, penalty = self.offsets.spread(residual)
-        return self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
+        score = self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
+        return replace(explanation, values=values, score=score, residual=residual, sigma_mm=sigma)
 
     def cost(self, settings: Mapping[str, Mapping[str, float]]) -> float:
         """-2 log of the posterior up to a constant, marginalised over the spreads of the run offsets."""
@@ -147,7 +163,4 @@ class Problem:
 
     def nothing(self) -> Explanation:
         """The model without any effect, with its score: the explanation from which gains are counted."""
-        residual = self.measured - self.whitened({})
-        sigma, penalty = self.offsets.spread(residual)
-        score = self.offsets.squared(residual, self.offsets.metric(sigma)) + penalty
-        return Explanation((), {}, score, residual, np.zeros((0, 0)), 0, sigma, rows=self.rows)
+        return self.judged(Explanation((), {}, 0.0, self.measured, np.zeros((0, 0)), 0, (), rows=self.rows), {})

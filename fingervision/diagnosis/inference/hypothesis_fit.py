@@ -284,7 +284,7 @@ def fit(
     problem : Problem
         Data and observation model.
     names : tuple of str
-        Names of the effects.
+        Names of the effects; without any, the result is the model without effects.
     start : mapping
         Initial values of the parameters.
     target : ndarray of float, shape (m,), or None
@@ -294,6 +294,8 @@ def fit(
     iterations : int
         Largest number of iterations.
     """
+    if not names:
+        return problem.nothing()
     aim = problem.measured if target is None else target
     order = tuple(name for name in problem.effects if name in names)
     listed = problem.parameters(order)
@@ -323,6 +325,11 @@ def fit(
         starts_price=float(np.sum(np.minimum(prices, np.log(problem.rows)))),
         rows=problem.rows,
     )
+
+
+def refit(problem: Problem, explanation: Explanation) -> Explanation:
+    """Fit the effects of an explanation thoroughly, from its own parameters."""
+    return fit(problem, explanation.names, explanation.values, iterations=MANY_STEPS)
 
 
 def _scanned(found: Descent[_JointSquares], lower: Array, upper: Array, *, thorough: bool) -> Descent[_JointSquares]:

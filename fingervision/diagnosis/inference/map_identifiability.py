@@ -15,6 +15,7 @@ from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.position_map import NAME, NODES, PositionMap, map_columns
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.signatures import signatures
+from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
 from fingervision.domain.effect import Array, Flags, History
 
 LINE_SHARE = 1e-3
@@ -79,7 +80,8 @@ def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Ex
     if not named:
         return {}
     alone = [whole - chain.stacked({key: value for key, value in values.items() if key != name}) for name in named]
-    _, mapped = _held(problem, position_map, problem.whitener.columns(np.stack(alone, axis=1))[0])
+    columns = WhitenedColumns(problem.whitener.columns(np.stack(alone, axis=1))[0], problem.offsets)
+    _, mapped = _held(problem, position_map, columns)
     return {name: _reason(problem) for name, held in zip(named, mapped.tolist(), strict=True) if held}
 
 
@@ -97,24 +99,17 @@ def _reason(problem: Problem) -> str:
     return f"it cannot be distinguished from the map of position errors: over {span} it depends on the position alone"
 
 
-def _held(problem: Problem, position_map: PositionMap, columns: Array) -> tuple[Flags, Flags]:
+def _held(problem: Problem, position_map: PositionMap, columns: WhitenedColumns) -> tuple[Flags, Flags]:
     """Whether a straight line represents each whitened column, and whether a map's curve represents the remainder."""
     nodes_mm = position_map.nodes_mm
     raw = map_columns(problem.chain, nodes_mm)
     line = np.stack([np.ones_like(nodes_mm), nodes_mm - nodes_mm.mean()], axis=1)
     curve, straight = problem.whitener.columns(raw)[0], problem.whitener.columns(raw @ line)[0]
-    offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
-
-    def left(beside: Array) -> Array:
-        """Squared lengths of the parts of columns orthogonal to run offsets and to the columns `beside`; shape (k,)."""
-        moved = offsets.beside(beside, metric)
-        rest = columns - beside @ (np.linalg.pinv(beside.T @ moved) @ (moved.T @ columns))
-        shared = offsets.design.T @ rest
-        return np.asarray(np.einsum("ij,ij->j", rest, rest) - np.einsum("ij,ij->j", shared, metric @ shared))
-
-    bent = left(straight)
-    lines = bent < LINE_SHARE * np.einsum("ij,ij->j", columns, columns)
-    return lines, ~lines & (left(curve) < CURVE_SHARE * bent)
+    nothing = problem.nothing()
+    metric = problem.offsets.metric(nothing.sigma_mm)
+    bent, left = (columns.against(nothing.residual, metric, beside)[1] for beside in (straight, curve))
+    lines = bent < LINE_SHARE * columns.squares
+    return lines, ~lines & (left < CURVE_SHARE * bent)
 
 
 MOST_PASSES = 8

@@ -14,6 +14,8 @@ from fingervision.domain.response import Response
 from fingervision.effects import catalogue
 from fingervision.effects.time_delay import is_delay, late
 
+SLOPE_STEP = 1e-3
+"""Step, as a share of the range, for the derivative of the prediction with respect to the input."""
 SAME_S = 1e-9
 """Times closer than this are one point: the rounding of a difference of two times."""
 
@@ -137,6 +139,13 @@ class MeasuringChain:
         """
         path = None if self.path is None else self.path.moved(input_mm - self.history.input_mm)
         return replace(self, history=replace(self.history, input_mm=input_mm), path=path)
+
+    @cached_property
+    def slope(self) -> Array:
+        """Change of the stacked prediction per change of the recorded input, without effects; shape (channels * n,)."""
+        reach = SLOPE_STEP * self.history.input_span_mm
+        low, high = (self.with_input(self.history.input_mm + way).stacked({}) for way in (-reach, reach))
+        return np.asarray((high - low) / (2.0 * reach))
 
     def with_rest_gap(self, rest_gap_mm: float) -> "MeasuringChain":
         """Return the chain with another gap of the model at input zero."""

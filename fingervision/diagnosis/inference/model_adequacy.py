@@ -13,6 +13,7 @@ from fingervision.diagnosis.inference.map_identifiability import LINE_SHARE
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
 from fingervision.diagnosis.inference.signatures import tangents
 from fingervision.diagnosis.input.record_nuisances import below_the_input
+from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
 from fingervision.domain.effect import Array, Flags
 from fingervision.effects import catalogue
 
@@ -99,25 +100,7 @@ def shapes_of(problem: Problem) -> Probes:
     return probes(history, problem.whitener, 2400 if history.input_mm.size <= LONG else 800)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Basis:
-    """Whitened columns, shape (m, k), with their squared lengths and their inner products with the run offsets."""
-
-    columns: Array
-    squares: Array
-    shared: Array
-
-    @classmethod
-    def of(cls, problem: Problem, columns: Array) -> "_Basis":
-        """Precompute the quantities that every evaluation of the probes needs."""
-        return cls(columns, np.einsum("ij,ij->j", columns, columns), problem.offsets.design.T @ columns)
-
-    def beside_offsets(self, metric: Array) -> Array:
-        """Squared lengths of the parts of columns orthogonal to the run offsets, for given spreads; shape (k,)."""
-        return np.asarray(self.squares - np.einsum("ij,ij->j", self.shared, metric @ self.shared))
-
-
-def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) -> tuple[Array, Array, Array]:
+def _gains(problem: Problem, basis: WhitenedColumns, found: Explanation, taken: Array) -> tuple[Array, Array, Array]:
     """Reduction of chi-square by each column, in the residual of an explanation and of the columns already used.
 
     Returns
@@ -125,17 +108,8 @@ def _gains(problem: Problem, basis: _Basis, found: Explanation, taken: Array) ->
     gain, dot, norm : ndarray of float, shape (k,)
         `dot / norm` is the column's coefficient; both are zero if the column depends linearly on columns already used.
     """
-    offsets, metric = problem.offsets, problem.offsets.metric(found.sigma_mm)
-    columns = basis.columns
-    dot = columns.T @ offsets.beside(found.residual, metric)
-    norm = basis.beside_offsets(metric)
-    moves = np.hstack([tangents(problem, found), taken]) if found.names else taken
-    if moves.shape[1]:
-        bent = offsets.beside(moves, metric)
-        cross = bent.T @ columns
-        inverse = np.linalg.pinv(moves.T @ bent)
-        dot = dot - cross.T @ (inverse @ (bent.T @ found.residual))
-        norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
+    moves = np.hstack([tangents(problem, found), taken])
+    dot, norm = basis.against(found.residual, problem.offsets.metric(found.sigma_mm), moves)
     usable = norm > 1e-3 * np.maximum(basis.squares, 1e-12)
     dot, norm = np.where(usable, dot, 0.0), np.where(usable, norm, 0.0)
     return np.where(usable, dot**2 / np.where(usable, norm, 1.0), 0.0), dot, norm
@@ -165,7 +139,7 @@ def imitated(problem: Problem, shapes: Probes, found: Explanation, fewer: list[E
     """
     several = len(found.names) > 2 and _curved(problem, found) > 1
     columns, rows = shapes.columns, problem.measured.size
-    basis = _Basis.of(problem, columns)
+    basis = WhitenedColumns(columns, problem.offsets)
     # If the noise is known from repeats, a probe can also represent a play in readings at rest, including the
     # inexactness of the play's formula: such probes are excluded.
     same = several or problem.form_share > SMALL_SHARE
@@ -203,25 +177,21 @@ def _size_in_runs(problem: Problem, change: Array) -> float:
     return float(np.sqrt(np.mean(np.concatenate(apart) ** 2)))
 
 
-def _is_an_effect_itself(problem: Problem, found: Explanation, basis: _Basis) -> Flags:
+def _is_an_effect_itself(problem: Problem, found: Explanation, basis: WhitenedColumns) -> Flags:
     """Mark the probes that have the shape of one of the effects, or are straight lines; shape (k,).
 
     For example, in readings at rest, play is merely a difference between the two directions, and a probe that describes
     this difference is not another explanation. A ramp over time in addition to an offset has the shape of warming; in
     addition to a map of position errors, every function of position counts as a line.
     """
-    offsets, metric = problem.offsets, problem.offsets.metric(found.sigma_mm)
-    norm = np.maximum(basis.beside_offsets(metric), 1e-12)
+    metric = problem.offsets.metric(found.sigma_mm)
     shapes = own_shapes(problem, found)
     lines = np.stack([np.zeros(basis.columns.shape[0]), *(s for s in shapes if is_a_line(problem, s))], axis=1)
-    inverse = np.linalg.pinv(lines.T @ offsets.beside(lines, metric))
-    cross = basis.columns.T @ offsets.beside(lines, metric)
-    left = norm - np.einsum("ij,ij->i", cross @ inverse, cross)
-    own: Flags = np.asarray(left <= (1.0 - SAME_SHAPE**2) * norm)
+    left = basis.against(found.residual, metric, lines)[1]
+    own: Flags = np.asarray(left <= (1.0 - SAME_SHAPE**2) * np.maximum(basis.lengths(metric), 1e-12))
     for shape in shapes:
-        moved = offsets.beside(shape - lines @ (inverse @ (lines.T @ offsets.beside(shape, metric))), metric)
-        if float(shape @ moved) > 0.0:
-            own |= (basis.columns.T @ moved) ** 2 > SAME_SHAPE**2 * left * float(shape @ moved)
+        alone = WhitenedColumns(shape[:, None], problem.offsets).against(shape, metric, lines)[1][0]
+        own |= (basis.against(shape, metric, lines)[0] ** 2 > SAME_SHAPE**2 * left * alone) & (alone > 0.0)
     return own
 
 
@@ -247,7 +217,7 @@ def is_a_line(problem: Problem, shape: Array) -> bool:
 def remaining_structure(problem: Problem, shapes: Probes, best: Explanation) -> tuple[str | None, str | None]:
     """Test the largest gain among many probes; return unknown structure, or structure that is known to be small."""
     own = harmonics(problem, best)
-    gain, dot, norm = _gains(problem, _Basis.of(problem, shapes.columns), best, own.columns)
+    gain, dot, norm = _gains(problem, WhitenedColumns(shapes.columns, problem.offsets), best, own.columns)
     # A shape is one of many, and its size is fitted; the noise is as large as it may be.
     price = float(np.log(problem.rows)) + 2.0 * float(np.log(shapes.columns.shape[1]))
     threshold = price * float(np.exp(SURELY * noise_doubt(problem)))

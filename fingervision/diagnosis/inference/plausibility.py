@@ -10,7 +10,7 @@ from fingervision.diagnosis.inference.evidence import STRONG, choices
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
-from fingervision.diagnosis.noise.run_offsets import RunOffsets
+from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
 from fingervision.domain.effect import Array, Flags
 from fingervision.effects.play_operator import play
 
@@ -251,37 +251,30 @@ def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Ex
     rows = np.arange(history.input_mm.size) if data.chain.path is None else data.chain.path.rows
     if history.time_s is None:
         return None
-    residual = problem.nothing().residual
-    offsets, metric = problem.offsets, problem.offsets.metric(problem.nothing().sigma_mm)
-    reach = 1e-3 * history.input_span_mm
-    n = data.chain.history.input_mm.size
-    low, high = (data.chain.with_input(data.chain.history.input_mm + way).stacked({}) for way in (-reach, reach))
-    slope = (high - low) / (2.0 * reach)
+    nothing = problem.nothing()
+    residual, metric = nothing.residual, problem.offsets.metric(nothing.sigma_mm)
+    n, slope = data.chain.history.input_mm.size, data.chain.slope
     constant = np.ones(n)
     line = data.chain.history.input_mm - data.chain.history.input_mm.mean()
     beside = np.stack([slope * np.tile(shape, slope.size // n) for shape in (constant, line)], axis=1)
-    whitened = problem.whitener.columns(beside)[0]
-    alone = _without(residual, whitened, offsets, metric)
-    best: tuple[float, float] | None = None
-    for width in history.input_span_mm * np.geomspace(1e-5, 0.3, WIDTHS):
-        lag = np.empty_like(history.input_mm)
-        for run in history.runs:
-            first = np.sign(np.diff(history.input_mm[run])[np.flatnonzero(np.diff(history.input_mm[run]))[:1]].sum())
-            lag[run] = play(history.input_mm[run], width, -float(first)) - history.input_mm[run]
-        column = problem.whitener.one(slope * np.tile(lag[rows], slope.size // n))
-        own = _without(column, whitened, offsets, metric)
-        norm = offsets.squared(own, metric)
-        if norm > LEAST_NORM * max(float(column @ column), 1e-300):
-            # A swapped play leads by its whole width at most: the loop of a friction damper is larger.
-            taken = float(offsets.beside(own, metric) @ residual)
-            coefficient = float(np.clip(taken / norm, -1.0, 0.0))
-            gain = coefficient * (2.0 * taken - coefficient * norm)
-            if best is None or gain > best[0]:
-                best = gain, coefficient * width
-    if best is None:
-        return None
-    gain, size_mm = best
-    stands = offsets.squared(alone, metric)
+    widths = history.input_span_mm * np.geomspace(1e-5, 0.3, WIDTHS)
+    lags = np.empty((history.input_mm.size, WIDTHS))
+    for run in history.runs:
+        moves = np.diff(history.input_mm[run])
+        first = float(np.sign(moves[np.flatnonzero(moves)[:1]].sum()))
+        for k, width in enumerate(widths.tolist()):
+            lags[run, k] = play(history.input_mm[run], width, -first) - history.input_mm[run]
+    own, lines = (problem.whitener.columns(each)[0] for each in (
+        slope[:, None] * np.tile(lags[rows], (slope.size // n, 1)), beside))  # fmt: skip
+    tried = WhitenedColumns(own, problem.offsets)
+    dot, norm = tried.against(residual, metric, lines)
+    told = norm > LEAST_NORM * np.maximum(tried.squares, 1e-300)
+    # A swapped play leads by its whole width at most: the loop of a friction damper is larger.
+    size = np.where(told, np.clip(dot / np.where(told, norm, 1.0), -1.0, 0.0), 0.0)
+    gains = size * (2.0 * dot - size * norm)
+    best = int(np.argmax(gains))
+    gain, size_mm = float(gains[best]), float(size[best] * widths[best])
+    stands = float(WhitenedColumns(residual[:, None], problem.offsets).against(residual, metric, lines)[1][0])
     # Four numbers are fitted: offset and ratio, size and width of the play.
     cost = stands - gain + 4.0 * float(np.log(residual.size)) + 2.0 * float(np.log(len(problem.effects)))
     if gain < HALF * stands or cost > _physical(problem, rivals) - STRONG:
@@ -291,9 +284,3 @@ def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Ex
         "mechanism does: are the directions swapped, or is the sign of the gap wrong?",
         blocks=True,
     )
-
-
-def _without(values: Array, columns: Array, offsets: RunOffsets, metric: Array) -> Array:
-    """Project whitened values off the given columns; the shape is unchanged."""
-    moved = offsets.beside(columns, metric)
-    return np.asarray(values - columns @ np.linalg.lstsq(moved.T @ columns, moved.T @ values, rcond=1e-10)[0])

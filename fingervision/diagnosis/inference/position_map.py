@@ -39,8 +39,6 @@ LENGTHS, SIZES = 10, 25
 EVENLY = 200
 """Number of positions that represent the range of a continuous motion, so many that the two ends do not have too much
 weight."""
-SLOPE_STEP = 1e-3
-"""Step, as a share of the range, for the derivative of the prediction with respect to the input."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -181,11 +179,8 @@ def set_points(history: History) -> Array:
 def map_columns(chain: MeasuringChain, nodes_mm: Array) -> Array:
     """Change of the stacked prediction by a unit error of the stage at each node; shape (channels * n, k)."""
     history = chain.history
-    reach = SLOPE_STEP * history.input_span_mm
-    low, high = (chain.with_input(history.input_mm + way).stacked({}) for way in (-reach, reach))
-    slope = (high - low) / (2.0 * reach)
     inputs = np.clip(history.input_mm, nodes_mm[0], nodes_mm[-1])
-    return slope[:, None] * np.tile(_basis(nodes_mm, inputs), (slope.size // inputs.size, 1))
+    return chain.slope[:, None] * np.tile(_basis(nodes_mm, inputs), (chain.slope.size // inputs.size, 1))
 
 
 def _basis(nodes_mm: Array, inputs_mm: Array) -> Array:

@@ -7,7 +7,6 @@ import numpy as np
 
 from fingervision.diagnosis.inference.evidence import noise_doubt, odds
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, START_VARIANCE, Explanation, Point, Problem
-from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.domain.effect import Array, Effect
 from fingervision.domain.parameter import Parameter
 
@@ -196,10 +195,7 @@ def beside_starts(problem: Problem, explanation: Explanation) -> Problem:
         columns.append((problem.chain.stacked(moved) - base) / step * np.sqrt(START_VARIANCE))
     if not columns:
         return problem
-    drawn = problem.whitener.drawing
-    beside = [*columns] if drawn is None else [*columns, *drawn.T]
-    whitener = replace(problem.whitener, drawing=np.stack(beside, axis=1))
-    return replace(problem, whitener=whitener, offsets=RunOffsets.of(whitener))
+    return problem.beside(np.stack(columns, axis=1))
 
 
 def settled(
@@ -227,7 +223,7 @@ def settled(
     values, score = explanation.values, explanation.score
     if explanation.free < len(walk.listed):
         middle = walk.at(np.mean([walk.of(point) for point in found], axis=0))
-        worse = problem.score(middle)
+        worse = problem.judged(explanation, middle).score
         if worse - score < len(walk.listed):
             values, score = middle, worse
     rows = [[point[name][p.name] - values[name][p.name] for name, p in walk.listed] for point in found]
@@ -261,7 +257,7 @@ def beside_alternatives(problem: Problem, best: Explanation, alternatives: Seque
     if not own or not others:
         return best
     # The noise, and the path, may have been estimated anew since the alternatives were fitted.
-    against = np.array([odds(problem, replace(e, score=problem.score(e.values))) for e in (best, *others)])
+    against = np.array([odds(problem, problem.judged(e, e.values)) for e in (best, *others)])
     weights = np.exp(-0.5 * (against - against.min()))
     has = np.array([[name in e.names for name, _ in own] for e in (best, *others)])
     away = [[e.values[n][p] - best.values[n][p] if n in e.names else 0.0 for n, p in own] for e in others]

@@ -8,7 +8,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.explanation_candidates import different
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
+from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit, refit
 from fingervision.diagnosis.inference.map_identifiability import (
     foretells_other_passes,
     imitating_effects,
@@ -20,8 +20,7 @@ from fingervision.diagnosis.inference.search import Look, Searched
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.input.record_nuisances import below_the_input, mean_slope
-from fingervision.diagnosis.noise.run_offsets import RunOffsets
+from fingervision.diagnosis.input.record_nuisances import below_the_input
 
 BESIDE = 3
 """Number of the most probable single effects with which run gains and maps are tried; each costs a hundredth of a
@@ -103,16 +102,16 @@ def beside_map(state: Searched, look: Look) -> Searched:
     imitating = {n: why for n, why in imitating_effects(found.problem, first).items() if n not in look.forced}
     kept = known if known is not None and not set(known.names) & set(imitating) else None
     beside = look.again(_excluding(replace(state.data, position_map=first), imitating), kept)
-    plain = _without(beside.found.problem, first)
+    plain = beside.found.problem.without_first(first.coefficients.size)
     parts = imitating_parts(plain, first, beside.found.best)
     if parts and not parts.keys() & look.forced:
         # The map was estimated together with effects that represent a part of it: estimate it again without them.
         names = tuple(name for name in beside.found.best.names if name not in parts)
-        rest = fit(plain, names, beside.found.best.values, iterations=20) if names else plain.nothing()
+        rest = fit(plain, names, beside.found.best.values, iterations=MANY_STEPS)
         first, _ = likeliest_map(plain, rest)
         beside = look.again(_excluding(replace(beside.data, position_map=first), parts))
-        plain = _without(beside.found.problem, first)
-    rest = _left(plain, beside.found.best)
+        plain = beside.found.problem.without_first(first.coefficients.size)
+    rest = plain.judged(beside.found.best, beside.found.best.values)
     second, _ = likeliest_map(plain, rest)
     if not (asked or foretells_other_passes(plain, rest, second)):
         return state
@@ -124,8 +123,7 @@ def beside_map(state: Searched, look: Look) -> Searched:
         return beside
     if below_the_input(plain, float(np.sqrt(np.mean(second.fitted_mm**2)))):
         # If a stage returns to the same positions, its encoder rounds them equally; these errors are no effect.
-        said = _words_on_roundings(second, plain)
-        return look.again(replace(state.data, roundings=second, notes=(*state.data.notes, said)), beside.found.best)
+        return state
     # If effects explain the data and the map replaces none of them, the map only describes the inexactness of their
     # formulas.
     stays = found.unknown is None and set(found.best.names) <= set(beside.found.best.names)
@@ -156,18 +154,9 @@ def _contested(state: Searched, reason: str) -> Searched:
         f"a curve over the input of {1e3 * curve.rms_mm.value:.2g} um RMS{beside} is far more probable than "
         f"{' and '.join(found.best.names)}, but {reason}"
     )
-    part = found.problem.nothing() if known is None else _refitted(found.problem, known)
+    part = found.problem.nothing() if known is None else refit(found.problem, known)
     kept = (part,) if part.names else ()
     return replace(state, found=replace(found, best=part, alternatives=kept, unknown=words))
-
-
-def _words_on_roundings(repeated: PositionMap, problem: Problem) -> str:
-    gap_mm = float(np.sqrt(np.mean(repeated.fitted_mm[: problem.chain.history.input_mm.size] ** 2)))
-    rms_um, sigma_um = 1e3 * gap_mm / mean_slope(problem), 1e3 * problem.chain.history.input_sigma_mm
-    return (
-        f"the error of the recorded input repeats at the same positions ({rms_um:.2g} um RMS): as this is less than "
-        f"its standard uncertainty, {sigma_um:.2g} um, it does not count as {NAME}."
-    )
 
 
 def _likelier(
@@ -190,9 +179,9 @@ def _likelier(
         known, (effect, _) = begin, estimated(problem, begin)
         for _ in range(ROUNDS):
             # Refit the effects, because the random effect now explains what they imitated.
-            known = _refitted(_beside(problem, effect), known)
-            effect, _ = estimated(problem, _left(problem, known))
-        known = _refitted(_beside(problem, effect), known)
+            known = refit(problem.beside(effect.columns_mm), known)
+            effect, _ = estimated(problem, problem.judged(known, known.values))
+        known = refit(problem.beside(effect.columns_mm), known)
         tried.append((known.bic + effect.price, known, effect))
     cost, known, effect = min(tried, key=lambda one: one[0])
     rival = found.best if least < 0.0 else min(found.best, found.nearest, key=lambda e: e.bic)
@@ -208,7 +197,7 @@ def _line(problem: Problem, beside: Explanation | None = None) -> Explanation:
     """
     names = tuple(name for name in ("rest_gap_error", "lever_ratio_error") if name in problem.effects)
     begin = {**({} if beside is None else beside.values), **{name: {} for name in names}}
-    return fit(problem, tuple(begin), begin, iterations=5) if begin else problem.nothing()
+    return fit(problem, tuple(begin), begin, iterations=5)
 
 
 def _acting_in_time(found: Findings) -> list[Explanation]:
@@ -218,17 +207,6 @@ def _acting_in_time(found: Findings) -> list[Explanation]:
     """
     problem = found.problem
     return [_line(problem, e) for e in found.singles if problem.effects[e.names[0]].memory]
-
-
-def _beside(problem: Problem, effect: RunGains | PositionMap) -> Problem:
-    """Add the columns of a random effect to the columns that are refitted for every explanation."""
-    drawn = problem.whitener.drawing
-    columns = effect.columns_mm if drawn is None else np.hstack([effect.columns_mm, drawn])
-    return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=columns)))
-
-
-def _refitted(problem: Problem, one: Explanation) -> Explanation:
-    return fit(problem, one.names, one.values, iterations=MANY_STEPS) if one.names else problem.nothing()
 
 
 def _does_more(beside: Searched) -> bool:
@@ -243,8 +221,8 @@ def _does_more(beside: Searched) -> bool:
 
 def _gained(state: Searched, beside: Searched, effect: RunGains | PositionMap) -> float:
     """Decrease of -2 log likelihood by a random effect and the effects found with it, minus the penalty for it."""
-    plain = replace(_without(beside.found.problem, effect), effects=state.found.problem.effects)
-    rivals = [_refitted(plain, one) for one in (state.found.best, state.found.nearest)]
+    plain = replace(beside.found.problem.without_first(effect.coefficients.size), effects=state.found.problem.effects)
+    rivals = [refit(plain, one) for one in (state.found.best, state.found.nearest)]
     return min(rival.bic for rival in rivals) - beside.found.best.bic - effect.price
 
 
@@ -252,16 +230,3 @@ def _excluding(data: Observations, reasons: dict[str, str]) -> Observations:
     """Exclude effects from the search, and record the reason for each."""
     kept = {name: effect for name, effect in data.effects.items() if name not in reasons}
     return replace(data, effects=kept, excluded={**data.excluded, **reasons})
-
-
-def _left(problem: Problem, explanation: Explanation) -> Explanation:
-    """Score an explanation, without refitting, in another estimation problem."""
-    residual = problem.measured - problem.whitened(explanation.values)
-    return replace(explanation, residual=residual, sigma_mm=problem.offsets.spread(residual)[0])
-
-
-def _without(problem: Problem, effect: RunGains | PositionMap) -> Problem:
-    """Return the problem without a random effect's columns, which come first if that effect was added last."""
-    count, drawing = effect.coefficients.size, problem.whitener.drawing
-    kept = None if drawing is None or drawing.shape[1] == count else drawing[:, count:]
-    return replace(problem, offsets=RunOffsets.of(replace(problem.whitener, drawing=kept)))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import START_VARIANCE, Explanation, Point, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
+from fingervision.diagnosis.inference.hypothesis_fit import refit
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.signatures import derivatives
 from fingervision.diagnosis.input.observations import Observations
@@ -137,14 +137,12 @@ def settled_with_records(
         return with_record_errors(problem, best, simulated_errors(data, rng)), found
     errors_mm = list(simulated_errors(data, rng))
     alone = _with_picture_noise(data, problem, explanation, errors_mm)
-    best, found = settled(alone, fit(alone, explanation.names, explanation.values, iterations=MANY_STEPS), rng)
+    best, found = settled(alone, refit(alone, explanation), rng)
     # A residual above the assumed noise widens the intervals (Birge 1932).
     rows = max(1, problem.rows - best.free)
     best = replace(best, covariance=best.covariance * max(1.0, best.score / rows))
     best = with_record_errors(alone, best, errors_mm, assumed_mm=_assumed(alone, rng))
-    residual = problem.measured - problem.whitened(best.values)
-    sigma_mm, _ = problem.offsets.spread(residual)
-    return replace(best, residual=residual, score=problem.score(best.values), sigma_mm=sigma_mm), found
+    return problem.judged(best, best.values), found
 
 
 def _with_picture_noise(
@@ -159,9 +157,8 @@ def _with_picture_noise(
     turning, whitener, history = data.turning, problem.whitener, problem.chain.history
     if turning is None or history.time_s is None or data.repeats is not None:
         return problem
-    n, reach = history.input_mm.size, 1e-3 * history.input_span_mm
-    low, high = (problem.chain.with_input(history.input_mm + way).stacked({})[:n] for way in (-reach, reach))
-    seen = turning.apart * (high - low) / (2.0 * reach)
+    n = history.input_mm.size
+    seen = turning.apart * problem.chain.slope[:n]
     residual_mm = turning.apart * (data.stacked_mm - problem.chain.stacked(explanation.values))[:n]
     of_input = np.array(errors_mm) * seen
     aside = whitener.aside[:n]

@@ -20,7 +20,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     swapped,
 )
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
+from fingervision.diagnosis.inference.hypothesis_fit import fit, refit
 from fingervision.diagnosis.inference.model_adequacy import VERY_STRONG, imitated, remaining_structure
 from fingervision.diagnosis.inference.random_effect import estimated_coefficients
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
@@ -239,9 +239,7 @@ def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     if not columns_mm.any():
         return problem
     # What the errors of path and formulas explain is no noise of the picture.
-    left = problem.measured - problem.whitened(values)
-    beside = replace(explanation, residual=left, sigma_mm=problem.offsets.spread(left)[0])
-    errors, _ = estimated_coefficients(problem, beside, columns_mm.shape[1], 0)
+    errors, _ = estimated_coefficients(problem, problem.judged(explanation, values), columns_mm.shape[1], 0)
     return data.problem(residual_mm - columns_mm @ errors, free, explained=True, values=values)
 
 
@@ -299,8 +297,8 @@ def _fits_far_better(data: Observations, found: Findings) -> bool:
 
 def _likelihood_cost(data: Observations, explanation: Explanation) -> tuple[float, Flags]:
     """BIC of an explanation with the noise of its own residual, and the rows that were set aside for it."""
-    problem, names = problem_of(data, explanation), explanation.names
-    again = fit(problem, names, explanation.values, iterations=MANY_STEPS) if names else problem.nothing()
+    problem = problem_of(data, explanation)
+    again = refit(problem, explanation)
     _, determinant = problem.whitener.columns(problem.measured[:, None])
     return again.bic + determinant, problem.whitener.aside
 
@@ -318,5 +316,4 @@ def _noise_is_too_large(found: Findings) -> bool:
 def refitted(state: Searched) -> Searched:
     """Refit the best explanation with the noise and the random effects that belong to it."""
     problem, best = problem_of(state.data, state.found.best), state.found.best
-    refit = fit(problem, best.names, best.values, iterations=20) if best.names else best
-    return replace(state, found=state.found.with_best(refit, problem))
+    return replace(state, found=state.found.with_best(refit(problem, best), problem))

@@ -8,7 +8,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     single_effects,
 )
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, SMALL_SHARE, Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit
+from fingervision.diagnosis.inference.hypothesis_fit import refit
 from fingervision.diagnosis.inference.model_adequacy import shapes_of
 from fingervision.diagnosis.inference.probe_basis import Probes
 from fingervision.diagnosis.inference.signatures import Signatures, changes, signatures
@@ -112,7 +112,7 @@ class SearchState:
         known = self.known
         if known is None or len(known.names) != count or not set(known.names) <= set(self.problem.effects):
             return found
-        again = fit(self.problem, known.names, known.values, iterations=MANY_STEPS)
+        again = refit(self.problem, known)
         rest = [e for e in found if e.names != again.names or e.score <= again.score]
         kept = rest if any(e.names == again.names for e in rest) else [*rest, again]
         return sorted(kept, key=lambda explanation: explanation.score)

@@ -1,14 +1,14 @@
 """Signatures: change of the prediction by each effect at each of its starting values."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.noise.run_offsets import RunOffsets
-from fingervision.domain.effect import Array, History, start_key
+from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
+from fingervision.domain.effect import Array, Flags, History, start_key
 
 START_MOVES = 1e-3
 """Least size of a first motion, as a share of the range, that determines from which side a run starts."""
@@ -34,47 +34,33 @@ class Signatures:
         Parameters of each column.
     grows : tuple of (str, float, float) or None, length k
         Parameter that scales the column nearly linearly, with its neutral value and step; None if there is none.
-    columns : ndarray of float, shape (m, k)
-        Whitened difference from the model without the effect.
+    columns : WhitenedColumns
+        Whitened differences from the model without the effect.
     """
 
     names: tuple[str, ...]
     starts: tuple[dict[str, float], ...]
     grows: tuple[tuple[str, float, float, float, float] | None, ...]
-    columns: Array
-    _squares: Array = field(init=False, repr=False)
+    columns: WhitenedColumns
 
-    def __post_init__(self) -> None:
-        """Compute the squared lengths of the columns once, because every step of a search needs them."""
-        object.__setattr__(self, "_squares", np.einsum("ij,ij->j", self.columns, self.columns))
-
-    def gains(
-        self, residual: Array, offsets: RunOffsets, metric: Array, along: Array | None = None
-    ) -> tuple[Array, Array]:
-        """Reduction of chi-square by each column alone in a residual, and the column's fitted coefficient; shape (k,).
+    def gains(self, beside: Explanation, along: Array) -> tuple[Array, Array]:
+        """Reduction of chi-square by each column alone in an explanation's residual, and its coefficient; shape (k,).
 
         Parameters
         ----------
-        along : ndarray of float, shape (m, p), or None
+        beside : Explanation
+            The explanation.
+        along : ndarray of float, shape (m, p)
             Columns that are refitted at the same time and projected out.
         """
-        shared = offsets.design.T @ self.columns
-        weighted = offsets.beside(residual, metric)
-        dot = self.columns.T @ weighted
-        norm = self._squares - np.einsum("ij,ij->j", shared, metric @ shared)
-        full = norm.copy()
-        if along is not None and along.shape[1]:
-            moved = offsets.beside(along, metric)
-            cross = moved.T @ self.columns
-            inverse = np.linalg.pinv(along.T @ moved)
-            dot = dot - cross.T @ (inverse @ (moved.T @ residual))
-            norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
-        usable = norm > 1e-6 * np.maximum(full, 1e-12)
+        metric = self.columns.offsets.metric(beside.sigma_mm)
+        dot, norm = self.columns.against(beside.residual, metric, along)
+        usable = norm > 1e-6 * np.maximum(self.columns.lengths(metric), 1e-12)
         coefficient = np.where(usable, dot / np.where(usable, norm, 1.0), 0.0)
-        allowed = usable & self._in_bounds(coefficient)
+        allowed = self._in_bounds(coefficient) & usable
         return np.where(allowed, coefficient * dot, 0.0), coefficient
 
-    def _in_bounds(self, coefficient: Array) -> Array:
+    def _in_bounds(self, coefficient: Array) -> Flags:
         out = np.zeros(coefficient.size, dtype=bool)
         for i, grow in enumerate(self.grows):
             if grow is None:
@@ -109,7 +95,8 @@ class Changes(NamedTuple):
 
     def whitened(self, problem: Problem) -> Signatures:
         """Signatures for the noise of a problem."""
-        return Signatures(self.names, self.starts, self.grows, problem.whitener.columns(self.columns_mm)[0])
+        columns = WhitenedColumns(problem.whitener.columns(self.columns_mm)[0], problem.offsets)
+        return Signatures(self.names, self.starts, self.grows, columns)
 
 
 def signatures(problem: Problem) -> Signatures:
@@ -159,14 +146,14 @@ def start_patterns(history: History) -> tuple[dict[str, float], ...]:
 def derivatives(problem: Problem, explanation: Explanation) -> Array:
     """Derivatives of the prediction with respect to an explanation's parameters, before whitening; shape (m, p)."""
     base = problem.chain.stacked(explanation.values)
-    columns = []
+    columns = [np.zeros((base.size, 0))]
     for name, parameter in problem.parameters(explanation.names):
         value = explanation.values[name].get(parameter.name, 0.0)
         step = 1e-3 * max(abs(value), 1e-3 * min(parameter.upper - parameter.lower, 1.0))
         step = step if value + step <= parameter.upper else -step
         moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
-        columns.append((problem.chain.stacked(moved) - base) / step)
-    return np.stack(columns, axis=1)
+        columns.append((problem.chain.stacked(moved) - base)[:, None] / step)
+    return np.hstack(columns)
 
 
 def tangents(problem: Problem, explanation: Explanation) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.hypothesis_fit import fit, refit
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.search import Look, Searched, problem_of, refitted
 from fingervision.diagnosis.inference.search_state import Findings
@@ -96,8 +96,7 @@ def _likelier(data: Observations, found: Findings) -> Turned | None:
 
     def cost(each: Turned) -> float:
         problem = replace(judge, chain=each.data.chain)
-        fitted = fit(problem, each.explanation.names, each.explanation.values, iterations=20)
-        return fitted.bic + each.price
+        return refit(problem, each.explanation).bic + each.price
 
     costs = [cost(each) for each in tried]
     now = costs[0] if found.best.names else judge.nothing().score + data.turns.price
@@ -156,7 +155,7 @@ def _settled(data: Observations, explanation: Explanation) -> Turned:
         if np.max(np.abs(change) / (high - low)) < SETTLED:
             break
     problem = problem_of(data, explanation)
-    explanation = fit(problem, explanation.names, explanation.values, iterations=20)
+    explanation = refit(problem, explanation)
     information, _ = _normal_equations(data, problem, explanation)
     volume = float(np.linalg.slogdet(information * np.outer(data.turns.sigmas, data.turns.sigmas))[1])
     return Turned(data, problem, explanation, data.turns.price + volume)

@@ -45,10 +45,7 @@ def _score(problem: Problem, best: Explanation, fixed: bool) -> float:
     kept = {name: dict(best.values[name]) for name in best.names if name not in _like_delays()}
     starts: list[Point] = [{**kept, name: {"delay_s": _delay_s(best)}} for name in delays() if name in problem.effects]
     starts += [kept] if fixed else []
-    return min(
-        (fit(problem, tuple(start), start, iterations=MANY_STEPS).score if start else problem.nothing().score)
-        for start in starts
-    )
+    return min(fit(problem, tuple(start), start, iterations=MANY_STEPS).score for start in starts)
 
 
 def delays() -> tuple[str, ...]:

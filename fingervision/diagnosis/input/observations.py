@@ -126,8 +126,6 @@ class Observations:
         Change of the prediction by the uncertain offset between the clocks of input and pictures.
     function : FunctionModel or None
         Dynamic model, of which `model` is the static response.
-    roundings : PositionMap or None
-        Errors of the recorded input that repeat at its places because an encoder rounds them alike.
     turning : TurningErrors or None
         Errors of an encoder's record at the reversals of the stage.
     turns : UnseenTurns
@@ -147,7 +145,6 @@ class Observations:
     repeats: NDArray[np.intp] | None = None
     position_map: PositionMap | None = None
     run_gains: RunGains | None = None
-    roundings: PositionMap | None = None
     function: FunctionModel | None = None
     turning: TurningErrors | None = None
     turns: UnseenTurns = NO_TURNS
@@ -173,7 +170,7 @@ class Observations:
 
     def random_effects_mm(self, values: Mapping[str, Mapping[str, float]]) -> tuple[tuple[object, Array], ...]:
         """Random effects beside an explanation, each with its columns, in the order used by a problem."""
-        own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains, self.roundings) if one]
+        own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains) if one]
         drawing = [(DRAWING, self.refit.columns)] if self.refit.moved else []
         return (*own, *drawing, (PATH, self.path_errors_mm(values)), (FORM, self.form_errors_mm(values)))
 
@@ -214,7 +211,7 @@ class Observations:
         self, residual_mm: Array, degrees: int, *, explained: bool, values: Mapping[str, Mapping[str, float]] = NOTHING
     ) -> Problem:
         """Estimate outliers and noise from the residual of an explanation, and whiten the measurement with them."""
-        for nuisance in (self.position_map, self.run_gains, self.roundings):
+        for nuisance in (self.position_map, self.run_gains):
             residual_mm = residual_mm if nuisance is None else residual_mm - nuisance.fitted_mm
         parts = np.split(residual_mm, len(self.channels))
         aside = self.outliers(parts, explained=explained, values=values)

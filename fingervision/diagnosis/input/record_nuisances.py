@@ -21,14 +21,8 @@ def below_the_input(problem: Problem, size_mm: float) -> bool:
     """Whether a change of the gap is smaller than the change that the input's error or its encoder step may cause."""
     history = problem.chain.history
     share = OF_ROUNDING if history.input_step_mm > 0.0 else OF_NOISE
-    return size_mm < share * mean_slope(problem) * history.input_sigma_mm
-
-
-def mean_slope(problem: Problem) -> float:
-    """Mean change of the gap per change of the input, by the model."""
-    history = problem.chain.history
     gap = problem.chain.stacked({})[: history.input_mm.size]
-    return float(np.ptp(gap)) / history.input_span_mm
+    return size_mm < share * float(np.ptp(gap)) / history.input_span_mm * history.input_sigma_mm
 
 
 # Error of a clock offset that was estimated from the same motion, as a random effect.

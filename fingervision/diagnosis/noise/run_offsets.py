@@ -186,3 +186,55 @@ class RunOffsets:
                 mean = mean - np.sum(mean * z) / np.sum(z)
             found.append((self.scales_mm[channel], penalty, weight @ mean**2))
         return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WhitenedColumns:
+    """Whitened columns, of which each may explain a residual beside the offsets of the runs.
+
+    Parameters
+    ----------
+    columns : ndarray of float, shape (m, k)
+        The columns.
+    offsets : RunOffsets
+        The offsets.
+    """
+
+    columns: Array
+    offsets: RunOffsets
+    squares: Array = field(init=False, repr=False)
+    _shared: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Compute once what every step of a search needs: squared lengths, and products with the offsets."""
+        object.__setattr__(self, "squares", np.einsum("ij,ij->j", self.columns, self.columns))
+        object.__setattr__(self, "_shared", self.offsets.design.T @ self.columns)
+
+    def lengths(self, metric: Array) -> Array:
+        """Squared lengths of the parts of the columns that the offsets of a metric leave; shape (k,)."""
+        return np.asarray(self.squares - np.einsum("ij,ij->j", self._shared, metric @ self._shared))
+
+    def against(self, residual: Array, metric: Array, beside: Array) -> tuple[Array, Array]:
+        """Products of the columns with a residual, and their squared lengths, beside offsets and further columns.
+
+        Parameters
+        ----------
+        residual : ndarray of float, shape (m,)
+            Whitened residual.
+        metric : ndarray of float
+            Metric of the offsets.
+        beside : ndarray of float, shape (m, p)
+            Columns that are fitted at the same time.
+
+        Returns
+        -------
+        dot, norm : ndarray of float, shape (k,)
+            Their quotient is the fitted coefficient of a column alone, and `dot**2 / norm` its reduction of chi-square.
+        """
+        dot, norm = self.columns.T @ self.offsets.beside(residual, metric), self.lengths(metric)
+        if beside.shape[1]:
+            moved = self.offsets.beside(beside, metric)
+            cross, inverse = moved.T @ self.columns, np.linalg.pinv(beside.T @ moved)
+            dot = dot - cross.T @ (inverse @ (moved.T @ residual))
+            norm = norm - np.einsum("ij,ij->j", cross, inverse @ cross)
+        return np.asarray(dot), np.asarray(norm)

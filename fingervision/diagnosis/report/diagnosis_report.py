@@ -120,12 +120,10 @@ def encoder_zero(answered: Answer) -> tuple[str, ...]:
 def _of_input(answered: Answer, change_mm: Array) -> tuple[float, float]:
     """Offset of the input (mm) that causes a change of the gap, by generalised least squares, and its uncertainty."""
     problem, chain = answered.found.problem, answered.data.chain
-    reach = 1e-3 * chain.history.input_span_mm
-    low, high = (chain.with_input(chain.history.input_mm + way).stacked({}) for way in (-reach, reach))
     offsets, whitener = problem.offsets, problem.whitener
     # The offsets of the runs are the quantity itself here, and are not fitted.
     metric = offsets.metric((0.0,) * offsets.channels)
-    columns = whitener.columns(np.stack([(high - low) / (2.0 * reach), change_mm], axis=1))[0]
+    columns = whitener.columns(np.stack([chain.slope, change_mm], axis=1))[0]
     slope, change = columns.T
     bent = offsets.beside(slope, metric)
     normal = float(bent @ slope)
