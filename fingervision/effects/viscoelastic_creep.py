@@ -23,6 +23,12 @@ SLOWER = 2.0
 of the time between two readings; creep with a shorter time constant depends on when exactly the stage arrived."""
 
 
+def _share(tau_s: int) -> Parameter:
+    """Share that creeps with one time constant; a tenth is much even for a polymer finger."""
+    words = f"share of the opening that creeps with a time constant of {tau_s} s"
+    return Parameter(f"fraction_{tau_s}s", "", 0.0, 0.5, words, typical=0.1)
+
+
 def act(response: Response, history: History, values: Values) -> Response:
     """Apply the effect: the opening continues to change under a constant input."""
     opening_mm = response.gap_mm - history.rest_gap_mm
@@ -69,12 +75,7 @@ EFFECT = PointEffect(
     formula="o - sum of a_k (o - low-pass_k[o]), tau_k = 1, 4, 16, 64 s",
     source="generalised Maxwell body (Ferry 1980)",
     residual="an error that decays exponentially during holds",
-    parameters=(
-        Parameter("fraction_1s", "", 0.0, 0.5, "share of the opening that creeps with a time constant of 1 s"),
-        Parameter("fraction_4s", "", 0.0, 0.5, "share of the opening that creeps with a time constant of 4 s"),
-        Parameter("fraction_16s", "", 0.0, 0.5, "share of the opening that creeps with a time constant of 16 s"),
-        Parameter("fraction_64s", "", 0.0, 0.5, "share of the opening that creeps with a time constant of 64 s"),
-    ),
+    parameters=tuple(_share(tau_s) for tau_s in TAUS_S),
     needs_times=True,
     memory=True,
     most_together=0.5,

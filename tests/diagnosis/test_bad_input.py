@@ -137,7 +137,7 @@ def test_exchanged_directions_are_asked_about(tmp_path: Path) -> None:
     assert not report.effects
 
 
-@pytest.mark.parametrize("scale", [1e3, 1.0 / 25.4])
+@pytest.mark.parametrize("scale", [1e3, 1.0 / 25.4, 2.0])
 def test_a_model_in_another_unit_is_said_and_nothing_is_named(tmp_path: Path, scale: float) -> None:
     report = asked(tmp_path, stage("+-", 2, play_mm=0.0), scale=scale)
     assert report.verdict is Verdict.UNKNOWN
@@ -145,6 +145,18 @@ def test_a_model_in_another_unit_is_said_and_nothing_is_named(tmp_path: Path, sc
     said = re.search(r"moves (\S+) times as far as the model predicts: check the units", report.unknown or "")
     assert said is not None
     assert float(said.group(1)) == pytest.approx(1.0 / scale, rel=0.01)
+
+
+@pytest.mark.parametrize(("gain", "asks"), [(0.5, True), (1.25, False)])
+def test_a_gain_that_effects_hardly_have_is_asked_about(tmp_path: Path, gain: float, asks: bool) -> None:
+    # Half of the motion within one minute was named a creep of half of the opening with 64 s.
+    rng = np.random.default_rng(5)
+    time_s = 0.2 * np.arange(200)
+    u = 1.0 + np.arcsin(np.sin(2.0 * np.pi * time_s / 12.0)) / np.pi
+    gap = GAP_MM + gain * u + NOISE_MM * rng.standard_normal(u.size)
+    report = asked(tmp_path, {"time_s": time_s, "input_mm": u, "gap_mm": gap})
+    assert (report.verdict is Verdict.UNKNOWN) == asks
+    assert ("check the units" in str(report.unknown)) == asks
 
 
 @pytest.mark.parametrize("timed", [True, False])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import bdtr, bdtrc
 
-from fingervision.diagnosis.inference.evidence import STRONG, choices
+from fingervision.diagnosis.inference.evidence import STRONG, odds
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
@@ -16,9 +16,6 @@ from fingervision.effects.play_operator import play
 
 UNITS = (10.0, 25.4, 100.0, 1000.0, 1e6)
 """Ratios of units of length that are confused: powers of ten, and inches."""
-LARGEST_RATIO = 2.03
-"""Largest ratio of measured to predicted motion (or its inverse) that effects may cause: the catalogue's scale, lever
-and input errors together reach 1.3 * 1.3 * 1.2."""
 HALF = 0.5
 """Largest share of the variance of the disagreement and (unless the gap does not follow the input at all) of the gap
 itself that a mistake in the table may leave, if it is the mistake and not an effect that explains the table."""
@@ -62,9 +59,10 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
     """Ask about sign or unit of a column, if that alone explains the table far better than any physical explanation.
 
     A mistaken column is a hypothesis beside the effects: the gap follows the model with a gain of -1, of a ratio of
-    units, or of any size that no effect has, and no effect acts. It is asked about if it leaves less than half of the
-    variance and if its odds against the most probable explanation by effects are 20 to 1 or more. A gain of 0 is a gap
-    that has nothing to do with the input.
+    units, or of any other size, and no effect acts. It is asked about if it leaves less than half of the variance and
+    if its odds against the most probable explanation by effects are 20 to 1 or more. How large a gain effects may
+    cause is part of these odds, by the physical priors of their parameters. A gain of 0 is a gap that has nothing to do
+    with the input.
 
     Parameters
     ----------
@@ -73,16 +71,13 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
     problem : Problem
         Estimation problem with its noise.
     rivals : sequence of Explanation
-        Explanations by effects. If there is none but the model without effects, only gains are asked about that no
-        effect has; a delay, for example, can mirror a motion.
+        Explanations by effects, and the model without effects.
     """
     units = [each for unit in UNITS for each in (unit, 1.0 / unit)]
     gains = [(gain, 0) for gain in (0.0, -1.0, *units, *(-each for each in units))]
     free = _free_gain(data, problem)
-    if free is not None and (free < 0.0 or not 1.0 / LARGEST_RATIO < free < LARGEST_RATIO):
-        gains.append((free, 1))
-    searched = any(rival.names for rival in rivals)
-    able = [each for each in gains if (searched or each[0] > 0.0) and _leaves_less(data, problem, each[0])]
+    gains += [] if free is None else [(free, 1)]
+    able = [each for each in gains if _leaves_less(data, problem, each[0])]
     # Three kinds of mistake are equally likely beforehand: a column of something else, a sign, and one of many ratios.
     price = {gain: 2.0 * float(np.log(3.0 * (1 if gain in (0.0, -1.0) else len(gains)))) for gain, _ in gains}
     tried = [(_cost(data, problem, *each) + price[each[0]], each[0]) for each in able]
@@ -97,7 +92,7 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
             "whether they belong to the same measurement."
         )
     elif gain < 0.0:
-        far = "" if 1.0 / LARGEST_RATIO < -gain < LARGEST_RATIO else f", and {-gain:.3g} times as far"
+        far = "" if gain == -1.0 else f", and {-gain:.3g} times as far"
         words = (
             f"the measured gap falls where the model predicts a rise{far}: input_mm or the gap is mirrored (its sign "
             "is wrong), or the model belongs to another test bed."
@@ -106,14 +101,14 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
         words = (
             f"the measured gap moves {gain:.3g} times as far as the model predicts: check the units of the gap, the "
             "input and the model (a factor of 1000 means micrometres instead of millimetres, 25.4 means inches), "
-            "because no effect of the catalogue is so large."
+            "because effects of the catalogue are hardly so large."
         )
     return Finding(words, blocks=True)
 
 
 def _physical(problem: Problem, rivals: Sequence[Explanation]) -> float:
     """-2 log odds of the most probable explanation by effects."""
-    return min(rival.bic + choices(problem, rival) for rival in rivals)
+    return min(odds(problem, rival) for rival in rivals)
 
 
 def _moved(data: Observations) -> Array:
