@@ -138,10 +138,9 @@ def _settled(state: Searched, look: Look) -> Refitted:
     best, posterior = settled_with_records(data, found.problem, found.best, look.rng)
     found = found.with_best(beside_alternatives(found.problem, best, found.alternatives))
     if data.position_map is not None:
-        behind = data.behind(data.position_map, found.problem)
-        data = replace(data, position_map=data.position_map.refitted(found.problem, best, behind))
+        data = replace(data, position_map=data.position_map.refitted(found.problem, best))
     if data.run_gains is not None:
-        gains = data.run_gains.refitted(found.problem, best, data.behind(data.run_gains, found.problem))
+        gains = data.run_gains.refitted(found.problem, best)
         data = replace(data, run_gains=gains, notes=(*data.notes, gains.words))
     if data.refit.moved:
         data = data.redrawn(found.problem, best if best.names else found.problem.nothing())

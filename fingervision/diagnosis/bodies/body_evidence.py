@@ -103,30 +103,31 @@ def body_evidence(
         )
         return None, tuple(notes)
     columns = [table.channels[name].value[rows] for name in names]
-    floors = [_floor(table.channels[name].value[rows], table.channels[name].u, rows) for name in names]
+    floors = [noise_floor(table.channels[name].value[rows], table.channels[name].u, rows) for name in names]
     drawn = [known[name] for name in names]
     if GAP in answers.channels:
         drawn.append(GAP)
         columns.append(table.gap_mm[rows])
-        floors.append(_floor(table.gap_mm[rows], table.u_random_mm, rows))
+        floors.append(noise_floor(table.gap_mm[rows], table.u_random_mm, rows))
     if table.force_n is not None and FORCE in answers.channels:
         drawn.append(FORCE)
         columns.append(table.force_n[rows])
-        floors.append(_floor(table.force_n[rows], None, rows))
+        floors.append(noise_floor(table.force_n[rows], None, rows))
     prediction = BodyPrediction(answers, tuple(drawn), input_mm[rows])
-    runs = _runs_among(table.runs, rows)
+    runs = runs_among(table.runs, rows)
     search = PlaceSearch(prediction, np.stack(columns, axis=1), runs, np.array(floors), timed=table.time_s is not None)
     time_s = None if table.time_s is None else table.time_s[rows]
     return BodyEvidence(prediction, search.run(rng), rows, tuple(names), time_s), tuple(notes)
 
 
-def _floor(values: Array, u: Array | None, rows: NDArray[np.intp]) -> float:
+def noise_floor(values: Array, u: Array | None, rows: NDArray[np.intp]) -> float:
     """Smallest noise assumed for a channel: its stated uncertainty, or the rounding of its last digit."""
     digit = resolution(values) / float(np.sqrt(12.0))
     return max(digit, 0.0 if u is None else float(np.median(u[rows])))
 
 
-def _runs_among(runs: tuple[slice, ...], rows: NDArray[np.intp]) -> tuple[slice, ...]:
+def runs_among(runs: tuple[slice, ...], rows: NDArray[np.intp]) -> tuple[slice, ...]:
+    """Runs among the rows that are used; runs without such rows are left out."""
     ends = np.searchsorted(rows, [(run.start, run.stop) for run in runs])
     return tuple(slice(int(a), int(b)) for a, b in ends if b > a)
 

@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.bodies.body_evidence import FEWEST_ROWS, GAP, LEAST_PRESENT, drawing_of
+from fingervision.diagnosis.bodies.body_evidence import (
+    FEWEST_ROWS,
+    GAP,
+    LEAST_PRESENT,
+    drawing_of,
+    noise_floor,
+    runs_among,
+)
 from fingervision.diagnosis.bodies.body_prediction import known_channels
 from fingervision.diagnosis.bodies.healthy_reference import (
     DEGREE,
@@ -20,7 +27,6 @@ from fingervision.diagnosis.bodies.healthy_reference import (
     Recording,
     WhatChanged,
 )
-from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.domain.body_poses import FlexureOutline
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
@@ -322,11 +328,8 @@ def _recording(table: MeasuredTable, names: tuple[str, ...]) -> Recording:
             (table.gap_mm, table.u_random_mm) if name == GAP else (table.channels[name].value, table.channels[name].u)
         )
         values.append(value[rows])
-        digit = resolution(value[rows]) / float(np.sqrt(12.0))
-        floors.append(max(digit, 0.0 if u is None else float(np.median(u[rows]))))
-    ends = np.searchsorted(rows, [(run.start, run.stop) for run in table.runs])
-    runs = tuple(slice(int(a), int(b)) for a, b in ends if b > a)
-    timed = table.time_s is not None
+        floors.append(noise_floor(value[rows], u, rows))
+    runs, timed = runs_among(table.runs, rows), table.time_s is not None
     return Recording.of(table.input_mm[rows], np.stack(values, axis=1), runs, np.array(floors), timed=timed)
 
 

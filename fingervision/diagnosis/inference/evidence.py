@@ -95,13 +95,18 @@ def _averaging_gains(problem: Problem, one: Explanation, base: Explanation) -> f
     uncertainties of the record removed the noise of all readings at rest, an end stop that of a rest at an end. What
     smoothing has left is common to `input_samples` rows, and is not removed.
     """
-    added = [problem.effects[name] for name in one.names if name not in base.names]
-    if not any(effect.memory or effect.stands_at for effect in added):
+    if not _may_follow_errors(problem, one, base):
         return 0.0
     whitener = problem.whitener
     errors = whitener.passing_mm**2 + whitener.input_mm**2
     share = errors / (errors + whitener.noises[0].total_mm ** 2)
     return float(np.sum(share)) / max(1.0, whitener.input_samples)
+
+
+def _may_follow_errors(problem: Problem, one: Explanation, base: Explanation) -> bool:
+    """Whether an explanation adds an effect that can follow errors of the record: with memory, or at an end."""
+    added = [problem.effects[name] for name in one.names if name not in base.names]
+    return any(effect.memory or effect.stands_at for effect in added)
 
 
 def follows_the_input(problem: Problem, one: Explanation, base: Explanation) -> bool:
@@ -112,8 +117,7 @@ def follows_the_input(problem: Problem, one: Explanation, base: Explanation) -> 
     """
     if not (problem.whitener.passing_mm.any() or problem.whitener.input_mm.any()):
         return False
-    added = [problem.effects[name] for name in one.names if name not in base.names]
-    if not base.names and not any(effect.memory or effect.stands_at for effect in added):
+    if not base.names and not _may_follow_errors(problem, one, base):
         return False
     change = problem.chain.stacked(one.values) - problem.chain.stacked(base.values)
     return below_the_input(problem, float(np.sqrt(np.mean(change**2))))

@@ -1,6 +1,6 @@
 """Candidate explanations of one to three effects: ranked by linear signatures, then refitted jointly."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import permutations
 
 import numpy as np
@@ -34,6 +34,14 @@ FINE_VALUES = 4_000_000
 """Largest number of values in all such predictions: 32 MB."""
 SWAPS_REFITTED = 24
 """Number of partners refitted for each half of the best pair: each half has at most 26."""
+
+
+def best_each(explanations: Iterable[Explanation]) -> list[Explanation]:
+    """Keep the best fit of every set of effects; best first."""
+    found: dict[tuple[str, ...], Explanation] = {}
+    for explanation in sorted(explanations, key=lambda one: one.score):
+        found.setdefault(explanation.names, explanation)
+    return list(found.values())
 
 
 def single_effects(problem: Problem, atoms: Signatures, iterations: int, begins: int = BEGINS) -> list[Explanation]:
@@ -112,14 +120,11 @@ def extended(
             if gain[k] > LEAST_GAIN:
                 planned.append((base.score - float(gain[k]), base, name, atoms.begin(k, float(coefficient[k]))))
     planned.sort(key=lambda plan: plan[0])
-    found: dict[tuple[str, ...], Explanation] = {}
+    found: list[Explanation] = []
     for index, (_, base, name, start) in enumerate(planned[:most]):
-        explanation = fit(problem, (*base.names, name), {**base.values, name: start}, iterations=SCREENED)
-        old = found.get(explanation.names)
-        if old is None or explanation.score < old.score:
-            found[explanation.names] = explanation
+        found.append(fit(problem, (*base.names, name), {**base.values, name: start}, iterations=SCREENED))
         progress((index + 1) / most)
-    ranked = sorted(found.values(), key=lambda explanation: explanation.score)
+    ranked = best_each(found)
     return sorted(
         [refit(problem, e) for e in ranked[:refined]] + ranked[refined:],
         key=lambda e: e.score,
@@ -132,15 +137,13 @@ def pairs_in_time(problem: Problem, atoms: Signatures, singles: list[Explanation
     The signature of an effect with memory beside another one is hardly linear: a search from signatures missed a speed
     limit with a resonance, and stopped at four times their residual.
     """
-    owner, found = np.array(atoms.names), dict[tuple[str, ...], Explanation]()
+    owner, found = np.array(atoms.names), list[Explanation]()
     acting = [e for e in singles if problem.effects[e.names[0]].memory]
     for base, other in permutations(acting, 2):
         name = other.names[0]
         start, _ = scan(problem, base, name, [atoms.starts[k] for k in np.flatnonzero(owner == name)])
-        pair = fit(problem, (*base.names, name), {**base.values, name: start}, iterations=7)
-        if pair.names not in found or pair.score < found[pair.names].score:
-            found[pair.names] = pair
-    return list(found.values())
+        found.append(fit(problem, (*base.names, name), {**base.values, name: start}, iterations=7))
+    return found
 
 
 def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> list[Explanation]:
@@ -154,11 +157,7 @@ def swapped(problem: Problem, atoms: Signatures, pairs: list[Explanation]) -> li
     best = pairs[0]
     rests = [{name: best.values[name] for name in best.names if name != dropped} for dropped in best.names]
     halves = [fit(problem, tuple(rest), rest, iterations=0) for rest in rests]
-    found = {pair.names: pair for pair in pairs}
-    for pair in extended(problem, atoms, halves, SWAPS_REFITTED, lambda _: None):
-        if pair.names not in found or pair.score < found[pair.names].score:
-            found[pair.names] = pair
-    return sorted(found.values(), key=lambda explanation: explanation.score)
+    return best_each([*pairs, *extended(problem, atoms, halves, SWAPS_REFITTED, lambda _: None)])
 
 
 def different(problem: Problem, explanations: list[Explanation], most: int) -> list[Explanation]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.random_effect import estimated_coefficients
+from fingervision.diagnosis.inference.random_effect import MAP, estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array, Flags
@@ -116,7 +116,7 @@ def _predicted(data: Observations, problem: Problem, explanation: Explanation, h
     curve = data.position_map
     if curve is None:
         return predicted
-    numbers, _ = estimated_coefficients(rest, fitted, curve.columns_mm.shape[1], data.behind(curve, rest))
+    numbers, _ = estimated_coefficients(rest, fitted, MAP)
     return np.asarray(predicted + curve.columns_mm @ numbers)
 
 

@@ -84,8 +84,8 @@ class Problem:
     mapped : float
         Squared whitened length of the part that a map of position errors explains in addition to every explanation; 0
         without a map.
-    formed : int
-        Number of columns of the errors of formulas, which are the last ones of the random effects.
+    random : tuple of (str, int)
+        Names of the random effects beside every explanation, with their numbers of columns, in order.
     """
 
     chain: MeasuringChain
@@ -96,7 +96,7 @@ class Problem:
     form_share: float = SMALL_SHARE
     stalled: frozenset[str] = frozenset()
     mapped: float = 0.0
-    formed: int = 0
+    random: tuple[tuple[str, int], ...] = ()
     _searched: dict[str, list[tuple[str, Parameter]]] = field(default_factory=dict, init=False, repr=False)
 
     @property

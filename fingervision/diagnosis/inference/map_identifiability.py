@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.position_map import NAME, NODES, PositionMap, map_columns
-from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
+from fingervision.diagnosis.inference.random_effect import LEAST_GAIN, evidence_of
 from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
-from fingervision.domain.effect import Array, Flags, History
+from fingervision.domain.effect import Flags, History
 
 LINE_SHARE = 1e-3
 """Share of the squared length that a straight-line fit may leave of an effect that counts as a line: over a stroke,
@@ -153,15 +153,9 @@ def foretells_other_passes(problem: Problem, explanation: Explanation, position_
         for number in numbers
     ]
     gram, aim = sum(matrix for matrix, _ in each), sum(right for _, right in each)
-    whole = _gain(gram, aim)
-    foretold = [whole - _gain(gram - matrix, aim - right) for matrix, right in each]
+    whole = evidence_of(gram, aim)
+    foretold = [whole - evidence_of(gram - matrix, aim - right) for matrix, right in each]
     return sum(foretold) > 0.0 and min(foretold) > -LEAST_GAIN
-
-
-def _gain(gram: Array, aim: Array) -> float:
-    """Difference of twice the log marginal likelihood with and without a map."""
-    inner = np.eye(aim.size) + gram
-    return float(aim @ np.linalg.solve(inner, aim) - np.linalg.slogdet(inner)[1])
 
 
 def _parts(history: History) -> NDArray[np.intp]:

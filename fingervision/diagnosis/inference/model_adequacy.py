@@ -11,6 +11,7 @@ from fingervision.diagnosis.inference.evidence import SURELY, choices, jumps_ast
 from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.map_identifiability import LINE_SHARE
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
+from fingervision.diagnosis.inference.random_effect import evidence_of, normal_equations
 from fingervision.diagnosis.inference.signatures import tangents
 from fingervision.diagnosis.input.record_nuisances import below_the_input
 from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
@@ -72,18 +73,14 @@ def harmonics(problem: Problem, best: Explanation) -> Harmonics:
             moved = chain.with_input(history.input_mm + sd * amplitude_mm * wave)
             waves.append(moved.stacked(best.values) - base)
     waves_mm = np.stack(waves, axis=1)
-    columns = problem.whitener.columns(waves_mm)[0]
-    bent = problem.offsets.beside(columns, problem.offsets.metric(best.sigma_mm))
-    taken = bent.T @ best.residual
-    inner = columns.T @ bent + np.eye(taken.size)
-    share = np.linalg.solve(inner, taken)
-    evidence = float(share @ taken - np.linalg.slogdet(inner)[1])
+    gram, aim = normal_equations(problem, best, waves_mm)
+    share = np.linalg.solve(gram + np.eye(aim.size), aim)
     sizes = sds * np.hypot(share[0::2], share[1::2])
     strongest = int(np.argmax(sizes))
-    if evidence < VERY_STRONG or sizes[strongest] > LARGEST:
+    if evidence_of(gram, aim) < VERY_STRONG or sizes[strongest] > LARGEST:
         return none
     words = f"the screw's harmonic of order {ORDERS[strongest]}, {100.0 * sizes[strongest]:.0f} % of its first"
-    return Harmonics(columns, waves_mm @ share, words)
+    return Harmonics(problem.whitener.columns(waves_mm)[0], waves_mm @ share, words)
 
 
 LONG = 4000

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.inference.random_effect import (
+    MAP,
     RandomEffect,
     estimated_coefficients,
     gains_by_size,
@@ -75,9 +76,9 @@ class PositionMap(RandomEffect):
         pairs = ((self.rms_mm, other.rms_mm), (self.length_mm, other.length_mm))
         return all(abs(np.log(one.value / two.value)) < max(one.u or 0.0, 1e-12) / one.value for one, two in pairs)
 
-    def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "PositionMap":
-        """Estimate the map's curve for an explanation; `behind` is the number of columns after those of the map."""
-        best, covariance_of_best = estimated_coefficients(problem, explanation, self.coefficients.size, behind)
+    def refitted(self, problem: Problem, explanation: Explanation) -> "PositionMap":
+        """Estimate the map's curve for an explanation."""
+        best, covariance_of_best = estimated_coefficients(problem, explanation, MAP)
         curve = self.root_mm @ best
         rms = float(np.sqrt(np.mean(curve**2)))
         # Propagate the curve's posterior covariance to its root mean square, by the derivative with respect to the

@@ -41,8 +41,13 @@ def normal_equations(problem: Problem, explanation: Explanation, raw_mm: Array) 
     return white.T @ beside, beside.T @ explanation.residual
 
 
-def estimated_coefficients(problem: Problem, explanation: Explanation, count: int, behind: int) -> tuple[Array, Array]:
-    """Estimate the coefficients of a random effect, given an explanation.
+MAP, GAINS, DRAWING, PATH, FORM = "map", "gains", "drawing", "path", "form"
+"""Names of the random effects beside an explanation: map of position errors, gains of the runs, uncertain dimensions of
+the drawing, errors of the path, and errors of formulas."""
+
+
+def estimated_coefficients(problem: Problem, explanation: Explanation, *names: str) -> tuple[Array, Array]:
+    """Estimate the coefficients of random effects, given an explanation.
 
     Parameters
     ----------
@@ -50,20 +55,34 @@ def estimated_coefficients(problem: Problem, explanation: Explanation, count: in
         Estimation problem whose refitted columns include those of the random effect.
     explanation : Explanation
         Explanation whose residual the random effect explains.
-    count, behind : int
-        Number of columns of the effect, and number of columns of other random effects that follow them.
+    names : str
+        Names of the random effects in the problem.
 
     Returns
     -------
-    coefficients : ndarray of float, shape (count,)
+    coefficients : ndarray of float, shape (k,)
         Posterior mean.
-    covariance : ndarray of float, shape (count, count)
+    covariance : ndarray of float, shape (k, k)
         Posterior covariance.
     """
     metric = problem.offsets.metric(explanation.sigma_mm)
     every = metric @ (problem.offsets.design.T @ explanation.residual)
-    own = slice(every.size - behind - count, every.size - behind)
-    return np.asarray(every[own], dtype=np.float64), np.asarray(metric[own, own], dtype=np.float64)
+    # The columns of the random effects are the last ones.
+    owners = [name for name, count in problem.random for _ in range(count)]
+    own = every.size - len(owners) + np.flatnonzero([name in names for name in owners])
+    return np.asarray(every[own], dtype=np.float64), np.asarray(metric[np.ix_(own, own)], dtype=np.float64)
+
+
+def evidence_of(gram: Array, aim: Array) -> float:
+    """Twice the log of the marginal likelihood with columns of a random effect over that without them.
+
+    Parameters
+    ----------
+    gram, aim : ndarray of float, shape (k, k) and (k,)
+        Normal equations of the columns (`normal_equations`).
+    """
+    inner = np.eye(aim.size) + gram
+    return float(aim @ np.linalg.solve(inner, aim) - np.linalg.slogdet(inner)[1])
 
 
 FEWEST_RUNS = 2
@@ -143,11 +162,9 @@ class RunGains(RandomEffect):
             "offsets, and not as an effect."
         )
 
-    def refitted(self, problem: Problem, explanation: Explanation, behind: int) -> "RunGains":
-        """Estimate the runs' gains for an explanation; `behind` is the number of columns after those of the gains."""
-        return replace(
-            self, coefficients=estimated_coefficients(problem, explanation, self.coefficients.size, behind)[0]
-        )
+    def refitted(self, problem: Problem, explanation: Explanation) -> "RunGains":
+        """Estimate the runs' gains for an explanation."""
+        return replace(self, coefficients=estimated_coefficients(problem, explanation, GAINS)[0])
 
 
 def likeliest_gains(problem: Problem, explanation: Explanation) -> tuple[RunGains, float]:

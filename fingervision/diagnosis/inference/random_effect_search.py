@@ -214,7 +214,7 @@ def _does_more(beside: Searched) -> bool:
     best, gains = beside.found.best, beside.data.run_gains
     if gains is None or not best.names:
         return False
-    scatter_mm = gains.refitted(beside.found.problem, best, beside.data.behind(gains, beside.found.problem)).scatter_mm
+    scatter_mm = gains.refitted(beside.found.problem, best).scatter_mm
     changed_mm = beside.data.chain.stacked(best.values) - beside.data.chain.stacked({})
     return bool(np.linalg.norm(changed_mm) > np.linalg.norm(scatter_mm))
 

@@ -11,6 +11,7 @@ from fingervision.diagnosis.inference.evidence import choices, detection_limits,
 from fingervision.diagnosis.inference.explanation_candidates import (
     LEAST_GAIN,
     Progress,
+    best_each,
     different,
     extended,
     likeliest,
@@ -22,7 +23,7 @@ from fingervision.diagnosis.inference.explanation_candidates import (
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit, refit
 from fingervision.diagnosis.inference.model_adequacy import VERY_STRONG, imitated, remaining_structure
-from fingervision.diagnosis.inference.random_effect import estimated_coefficients
+from fingervision.diagnosis.inference.random_effect import FORM, PATH, estimated_coefficients
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.search_state import ROUGH, Findings, SearchState, beyond_form, noise_known
 from fingervision.diagnosis.inference.verdict import STANDING_SHARE, standing_of
@@ -101,9 +102,7 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
     problem, singles = state.problem, state.singles
     pairs = state.with_known(extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress), 2)
     if pairs and _leaves_structure(state, pairs[0]):
-        in_time = {e.names: e for e in pairs_in_time(problem, state.atoms, singles)}
-        pairs = [min(e, in_time.pop(e.names, e), key=lambda one: one.score) for e in pairs]
-        pairs = sorted([*pairs, *in_time.values()], key=lambda one: one.score)
+        pairs = best_each([*pairs, *pairs_in_time(problem, state.atoms, singles)])
     pairs = [e for e in swapped(problem, state.atoms, pairs) if not follows_the_input(problem, e, singles[0])]
     state = replace(state, pairs=pairs)
     # Pairs are compared with the best single effect: compared with a simpler formula, a second effect would gain what a
@@ -239,7 +238,7 @@ def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     if not columns_mm.any():
         return problem
     # What the errors of path and formulas explain is no noise of the picture.
-    errors, _ = estimated_coefficients(problem, problem.judged(explanation, values), columns_mm.shape[1], 0)
+    errors, _ = estimated_coefficients(problem, problem.judged(explanation, values), PATH, FORM)
     return data.problem(residual_mm - columns_mm @ errors, free, explained=True, values=values)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from fingervision.diagnosis.inference.explanation_candidates import (
+    best_each,
     extended,
     single_effects,
 )
@@ -112,10 +113,7 @@ class SearchState:
         known = self.known
         if known is None or len(known.names) != count or not set(known.names) <= set(self.problem.effects):
             return found
-        again = refit(self.problem, known)
-        rest = [e for e in found if e.names != again.names or e.score <= again.score]
-        kept = rest if any(e.names == again.names for e in rest) else [*rest, again]
-        return sorted(kept, key=lambda explanation: explanation.score)
+        return best_each([*found, refit(self.problem, known)])
 
 
 def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> SearchState:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.diagnosis.inference.random_effect import estimated_coefficients
+from fingervision.diagnosis.inference.random_effect import DRAWING, estimated_coefficients
 from fingervision.domain.effect import Array
 from fingervision.domain.model import PhysicalModel
 
@@ -89,18 +89,16 @@ def _changes(drawn: PhysicalModel, moved: Mapping[str, float]) -> dict[str, floa
 
 
 def estimated(
-    refit: DrawingRefit, problem: Problem, explanation: Explanation, behind: int
+    refit: DrawingRefit, problem: Problem, explanation: Explanation
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Estimate the dimensions for an explanation, and their remaining uncertainty.
-
-    `behind` is the number of columns of random effects after those of the dimensions.
 
     Returns
     -------
     moved, known : dict of str to float
         Deviations, and remaining uncertainties, in standard uncertainties, by dotted name.
     """
-    best, covariance = estimated_coefficients(problem, explanation, refit.columns.shape[1], behind)
+    best, covariance = estimated_coefficients(problem, explanation, DRAWING)
     left = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     names = list(refit.moved)
     return (

@@ -10,7 +10,7 @@ from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.model_adequacy import harmonics
 from fingervision.diagnosis.inference.position_map import NAME
-from fingervision.diagnosis.inference.random_effect import estimated_coefficients
+from fingervision.diagnosis.inference.random_effect import FORM, estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import FORM_SHARE_OF_RIGS, Observations
 from fingervision.diagnosis.noise.channel_noises import most_noise
@@ -133,16 +133,13 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     noise = float(np.sqrt(0.25 * gap2 + noises[1] ** 2)) if both else float(np.sqrt(gap2))
 
     def rms(residual: Array) -> float:
-        gap = _without_scatter(residual[:n], history.runs)[~aside]
-        if not both:
-            return float(np.sqrt(np.mean(gap**2)))
-        midline = _without_scatter(residual[n : 2 * n], history.runs)[~aside]
-        return float(np.sqrt(np.mean(0.25 * gap**2 + (midline - midline.mean()) ** 2)))
+        parts = [_without_scatter(part, runs)[~aside] for part in np.split(residual, len(data.channels))]
+        return rms_mm(np.concatenate(parts), kept, both)
 
+    kept, gross = int(np.sum(~aside)), float(np.mean(aside & ~data.distrusted))
     degrees = None if errors is None else min(error.degrees for error in errors)
     half_digit_mm = 0.5 * resolution(data.table.gap_mm)
     rounding_mm = half_digit_mm if data.repeats is not None else 0.0
-    kept, gross = int(np.sum(~aside)), float(np.mean(aside & ~data.distrusted))
     left_out = tuple(np.flatnonzero(aside).tolist())
     left_mm = rms(after_mm)
     stated = degrees is not None or data.table.u_random_mm is not None or left_mm <= half_digit_mm
@@ -244,19 +241,18 @@ def standing_of(data: Observations, found: Findings) -> Standing:
     before = data.stacked_mm - data.chain.stacked({})
     left = data.stacked_mm - data.chain.stacked(found.best.values) - form_error_mm(data, found)
     if data.position_map is not None:
-        behind = data.behind(data.position_map, found.problem)
-        left = left - data.position_map.refitted(found.problem, found.best, behind).fitted_mm
+        left = left - data.position_map.refitted(found.problem, found.best).fitted_mm
     if data.run_gains is not None:
-        gains = data.run_gains.refitted(found.problem, found.best, data.behind(data.run_gains, found.problem))
-        data = replace(data, run_gains=gains)
+        data = replace(data, run_gains=data.run_gains.refitted(found.problem, found.best))
     return standing(data, found.problem, before, left)
 
 
 def form_error_mm(data: Observations, found: Findings) -> Array:
     """Estimated error of the formulas of the best explanation, as far as its kind is known; shape (m,) (mm)."""
     error_mm, columns_mm = harmonics(found.problem, found.best).fitted_mm, data.form_errors_mm(found.best.values)
-    if columns_mm.shape[1] == found.problem.formed:
-        error_mm = error_mm + columns_mm @ estimated_coefficients(found.problem, found.best, found.problem.formed, 0)[0]
+    coefficients, _ = estimated_coefficients(found.problem, found.best, FORM)
+    if columns_mm.shape[1] == coefficients.size:
+        error_mm = error_mm + columns_mm @ coefficients
     return np.asarray(error_mm, dtype=np.float64)
 
 

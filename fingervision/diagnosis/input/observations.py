@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.inference.position_map import PositionMap
-from fingervision.diagnosis.inference.random_effect import RunGains
+from fingervision.diagnosis.inference.random_effect import DRAWING, FORM, GAINS, MAP, PATH, RunGains
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.input.driven_model import with_dynamics
 from fingervision.diagnosis.input.record_nuisances import TurningErrors, clock_columns
@@ -80,13 +80,6 @@ SEEN_STAMPS = 0.3
 noise: it then changes a variance by less than a tenth."""
 SHORT = 100
 """Number of samples below which no row is excluded before an effect is found."""
-DRAWING = "drawing"
-"""Name of the random effect of the drawing's uncertain dimensions (`DrawingRefit.columns`)."""
-PATH = "path"
-"""Name of the random effect of the errors of the path (`Observations.path_errors_mm`)."""
-FORM = "form"
-"""Name of the random effect of the errors of formulas (`Observations.form_errors_mm`): the last one, because only an
-explanation with such a formula has columns of it."""
 NOTHING: Mapping[str, Mapping[str, float]] = MappingProxyType({})
 """The model without effects."""
 SMALL_TURN = 0.02
@@ -168,11 +161,12 @@ class Observations:
             floor = max(floor, float(np.median(self.table.u_random_mm)))
         return [{"gap": floor, "midline": 0.5 * floor, "force": 0.0}[name] for name in self.channels]
 
-    def random_effects_mm(self, values: Mapping[str, Mapping[str, float]]) -> tuple[tuple[object, Array], ...]:
-        """Random effects beside an explanation, each with its columns, in the order used by a problem."""
-        own = [(one, one.columns_mm) for one in (self.position_map, self.run_gains) if one]
-        drawing = [(DRAWING, self.refit.columns)] if self.refit.moved else []
-        return (*own, *drawing, (PATH, self.path_errors_mm(values)), (FORM, self.form_errors_mm(values)))
+    def random_effects_mm(self, values: Mapping[str, Mapping[str, float]]) -> dict[str, Array]:
+        """Columns of the random effects beside an explanation, by name, in the order used by a problem."""
+        found = {} if self.position_map is None else {MAP: self.position_map.columns_mm}
+        found |= {} if self.run_gains is None else {GAINS: self.run_gains.columns_mm}
+        found |= {DRAWING: self.refit.columns} if self.refit.moved else {}
+        return found | {PATH: self.path_errors_mm(values), FORM: self.form_errors_mm(values)}
 
     def path_errors_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Change of the prediction per standard uncertainty of reversals, turning points and clock; shape (m, k)."""
@@ -194,12 +188,6 @@ class Observations:
         if not others:
             return np.zeros((self.stacked_mm.size, 0))
         return np.stack([self.chain.stacked(other) for other in others], axis=1) - self.chain.stacked(values)[:, None]
-
-    def behind(self, effect: object, problem: Problem) -> int:
-        """Number of columns that follow the columns of a given random effect in a problem of these observations."""
-        listed = self.random_effects_mm({})
-        order = [one for one, _ in listed]
-        return problem.formed + sum(int(columns.shape[1]) for _, columns in listed[order.index(effect) + 1 :])
 
     @property
     def stalled(self) -> frozenset[str]:
@@ -261,8 +249,8 @@ class Observations:
         stamps = self.recorded.stamps_mm
         if stamps is not None and np.any(stamps > SEEN_STAMPS * noises[0].total_mm):
             passing = np.hypot(passing, stamps)
-        random = [columns for _, columns in self.random_effects_mm(values)]
-        beside = np.hstack(random)
+        random = self.random_effects_mm(values)
+        beside = np.hstack(list(random.values()))
         drawing = beside if beside.shape[1] else None
         whitener = Whitener(
             history,
@@ -288,7 +276,7 @@ class Observations:
             share,
             self.stalled,
             mapped,
-            random[-1].shape[1],
+            tuple((name, columns.shape[1]) for name, columns in random.items()),
         )
 
     def without_stamps(self, residual_mm: Array) -> Array:
@@ -372,7 +360,7 @@ class Observations:
         drawn = self.model.base
         if not (self.refit.moved and isinstance(drawn, PhysicalModel)):
             return self
-        moved, known = estimated(self.refit, problem, explanation, self.behind(DRAWING, problem))
+        moved, known = estimated(self.refit, problem, explanation)
         model = with_moved(drawn, moved)
         rest_mm = float(model.respond(np.zeros(1)).gap_mm[0])
         chain = replace(self.chain, model=model).with_rest_gap(rest_mm)
