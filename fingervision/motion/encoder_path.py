@@ -44,7 +44,7 @@ def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm:
     ndarray of float, shape (n,)
     """
     out = smooth_mm.copy()
-    turns = _reversals(smooth_mm, step_mm)
+    turns = reversals(smooth_mm, step_mm)
     for before, turn, after in zip([0, *turns], turns, [*turns[1:], smooth_mm.size - 1], strict=False):
         left = stroke(time_s, reading_mm, turn, np.arange(turn, before - 1, -1), step_mm)
         right = stroke(time_s, reading_mm, turn, np.arange(turn, after + 1), step_mm)
@@ -58,8 +58,8 @@ def sharp_reversals(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm:
     return out
 
 
-def _reversals(input_mm: Array, step_mm: float) -> list[int]:
-    """Row numbers of the extremes between which a path moves by more than an encoder step; ripples are ignored."""
+def reversals(input_mm: Array, least_mm: float) -> list[int]:
+    """Row numbers of the extremes between which a path moves by more than a least distance; ripples are ignored."""
     steps = np.diff(input_mm)
     moves = np.flatnonzero(steps)
     rows = moves[1:][np.sign(steps[moves[1:]]) != np.sign(steps[moves[:-1]])]
@@ -67,9 +67,9 @@ def _reversals(input_mm: Array, step_mm: float) -> list[int]:
     last, way = 0, 0.0
     for row in [*rows.tolist(), input_mm.size - 1]:
         moved = input_mm[row] - input_mm[last]
-        if moved * way > 0.0 or (way == 0.0 and abs(moved) > step_mm):
+        if moved * way > 0.0 or (way == 0.0 and abs(moved) > least_mm):
             last, way = row, float(np.sign(moved))
-        elif way != 0.0 and abs(moved) > step_mm:
+        elif way != 0.0 and abs(moved) > least_mm:
             found.append(last)
             last, way = row, -way
     return found

@@ -9,6 +9,7 @@ import numpy as np
 from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.domain.effect import Array, History
+from fingervision.motion.encoder_path import reversals
 
 # Systematic error of the recorded input: differences in the stage's motion below this error are not significant.
 
@@ -123,23 +124,10 @@ class TurningErrors:
 
 def _turns(input_mm: Array, run: slice, reach_mm: float) -> list[tuple[slice, int]]:
     """Reversals of a run by more than `reach_mm`: samples around each that lie within this reach, and its sample."""
-    x = input_mm[run]
-    peaks, rising = [0], 0
-    for i in range(1, x.size):
-        ahead = x[i] - x[peaks[-1]]
-        if (rising == 0 and abs(ahead) > reach_mm) or rising * ahead < -reach_mm:
-            rising = 1 if ahead > 0.0 else -1
-            peaks.append(i)
-        elif rising * ahead > 0.0:
-            peaks[-1] = i
-    found = []
-    for (before, at), after in zip(pairwise(peaks), [*peaks[2:], x.size - 1], strict=False):
-        if at == x.size - 1 or after == at:
-            continue
+    x, found = input_mm[run], []
+    for before, at in pairwise([0, *reversals(x, reach_mm)]):
         far = np.abs(x - x[at]) >= reach_mm
         low = int(np.max(np.flatnonzero(far[before:at]), initial=-1)) + before + 1
-        beyond = np.flatnonzero(far[at:])
-        high = at + int(beyond[0]) if beyond.size else x.size
-        if beyond.size:
-            found.append((slice(run.start + low, run.start + high), run.start + at))
+        high = at + int(np.argmax(far[at:]))
+        found.append((slice(run.start + low, run.start + high), run.start + at))
     return found

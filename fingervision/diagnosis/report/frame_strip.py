@@ -13,6 +13,7 @@ import numpy as np
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.frames.source import open_source
+from fingervision.motion.encoder_path import reversals
 from fingervision.storage.plain_file import json_of
 from fingervision.storage.summary_json import SUMMARY
 
@@ -73,7 +74,7 @@ def strip_html(table: Path) -> str:
 
 
 def turning_rows(table: Path) -> tuple[Turn, ...]:
-    """Find the first row of a gaps.csv and the rows at which the input reversed; none if columns are missing."""
+    """Find the first and last row of a gaps.csv and the rows at which the input reversed; none without its columns."""
     with table.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     found: list[Turn] = []
@@ -88,17 +89,7 @@ def turning_rows(table: Path) -> tuple[Turn, ...]:
     if not found:
         return ()
     inputs = np.array([turn.input_mm for turn in found])
-    least_mm = TURN * float(np.ptp(inputs))
-    turns, far, way = [0], 0, 0.0
-    for k in range(1, inputs.size):
-        if way == 0.0:
-            way = float(np.sign(inputs[k] - inputs[0])) if abs(inputs[k] - inputs[0]) > least_mm else 0.0
-        if way * (inputs[k] - inputs[far]) >= 0.0:
-            far = k
-        elif abs(inputs[k] - inputs[far]) > least_mm:
-            turns.append(far)
-            far, way = k, -way
-    turns.append(far)
+    turns = [0, *reversals(inputs, TURN * float(np.ptp(inputs))), inputs.size - 1]
     return tuple(found[k] for k in dict.fromkeys(turns))[:MOST_FRAMES]
 
 
