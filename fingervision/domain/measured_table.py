@@ -122,6 +122,11 @@ class MeasuredTable(ShortRepr):
     channels: Mapping[str, Channel] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
+    def path_rows(self) -> NDArray[np.intp]:
+        """Rows of the path at which the measured rows lie; shape (n,)."""
+        return np.arange(self.input_mm.size) if self.path is None else self.path.rows
+
+    @property
     def shared_clock(self) -> bool:
         """Whether the runs' times follow one another without overlap."""
         if self.time_s is None:

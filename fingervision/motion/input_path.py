@@ -222,7 +222,7 @@ def input_path(
     _, time_s, runs = recorded(table)
     if time_s is None:
         return None
-    rows = np.arange(along_mm.size) if table.path is None else table.path.rows
+    rows = table.path_rows
     rest = readings_at_rest(table)
     between = turns.points
     if table.path is None and not commanded and not rest.any() and not between:

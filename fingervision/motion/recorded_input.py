@@ -150,7 +150,7 @@ class RecordedInput:
             return cls.exact(table, commanded=True)
         record = SmoothedRecord.of(along_mm, time_s, runs)
         path_mm = record.path_mm
-        rows = np.arange(along_mm.size) if table.path is None else table.path.rows
+        rows = table.path_rows
         is_motion, noise_mm = False, 0.0
         if record.sigma_mm > 0.0:
             is_motion, noise_mm = _motion_in_fluctuations(table, model, path_mm[rows])

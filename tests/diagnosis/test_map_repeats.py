@@ -60,5 +60,5 @@ def test_set_points_commanded_once_show_no_map(times: int, words: str | None) ->
     input_mm = np.repeat(set_points, 20)
     time_s = 0.1 * np.arange(input_mm.size)
     history = History(input_mm, time_s, (slice(0, input_mm.size),), 1.0, 12.0, commanded=True)
-    reason = why_no_map(history, None)
+    reason = why_no_map(history)
     assert reason is None if words is None else words in str(reason)

@@ -340,13 +340,13 @@ def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: Plac
 def _driven_input(done: "Diagnosis") -> Array:
     """Input that the mechanism receives: the recorded input after the drive effects that the poses do not determine."""
     chain = done.data.chain
-    history = chain.history if chain.path is None else chain.path.history
+    history = chain.along.history
     input_mm = history.input_mm
     values = {**chain.fixed, **{e.name: {n: p.value for n, p in e.parameters.items()} for e in done.report.effects}}
     for name, effect in chain.effects.items():
         if name in values and isinstance(effect, DriveEffect) and not effect.curve and effect.in_drawing is None:
             input_mm = effect.act(input_mm, history, values[name])
-    return np.asarray(input_mm if chain.path is None else input_mm[chain.path.rows])
+    return np.asarray(input_mm[chain.along.rows])
 
 
 def _less(table: MeasuredTable, added: Mapping[str, Array], answers: PlaceAnswers) -> MeasuredTable:

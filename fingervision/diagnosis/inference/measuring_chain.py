@@ -141,6 +141,12 @@ class MeasuringChain:
         return replace(self, history=replace(self.history, input_mm=input_mm), path=path)
 
     @cached_property
+    def along(self) -> InputPath:
+        """Path of the input; the measured rows themselves if they contain all of it."""
+        rows = np.arange(self.history.input_mm.size)
+        return InputPath(self.history, rows, rows) if self.path is None else self.path
+
+    @cached_property
     def slope(self) -> Array:
         """Change of the stacked prediction per change of the recorded input, without effects; shape (channels * n,)."""
         reach = SLOPE_STEP * self.history.input_span_mm
@@ -160,10 +166,9 @@ class MeasuringChain:
         An effect named in `settings` replaces a fixed effect of the same name.
         """
         acting = {**self.fixed, **settings}
-        history = self.history if self.path is None else self.path.history
+        history = self.along.history
         for effect in self._delays(acting, self._stages[1]):
-            rows = np.arange(history.input_mm.size) if self.path is None else self.path.rows
-            return self._before(effect, acting, rows).respond(_without(effect, acting))
+            return self._before(effect, acting, self.along.rows).respond(_without(effect, acting))
         points = [effect for effect in self._stages[1] if effect.name in acting]
         response = self._answered(acting)
         if self.dynamics is not None and self.dynamics[0] is history.time_s:
@@ -196,10 +201,10 @@ class MeasuringChain:
     def driven_mm(self, settings: Settings) -> Array:
         """Input (mm) that the mechanism receives at the measured rows, after the drive effects; shape (n,)."""
         along = self._driven_mm({**self.fixed, **settings})
-        return along if self.path is None else along[self.path.rows]
+        return along[self.along.rows]
 
     def _driven_mm(self, acting: Settings) -> Array:
-        history = self.history if self.path is None else self.path.history
+        history = self.along.history
         input_mm, drives = history.input_mm, self._stages[0]
         if history.commanded:
             # A delay commutes with effects that do not depend on time. Delays are applied last, because the jumps of a
@@ -226,8 +231,7 @@ class MeasuringChain:
 
     def _before(self, delay: Effect, acting: Settings, rows: NDArray[np.intp]) -> "MeasuringChain":
         """Return the chain whose rows are some points of the path, earlier by a delay."""
-        history = self.history if self.path is None else self.path.history
-        path = delayed_path(history, rows, acting[delay.name]["delay_s"], curved=self.curved)
+        path = delayed_path(self.along.history, rows, acting[delay.name]["delay_s"], curved=self.curved)
         return replace(self, fixed={}, path=path)
 
     def stacked(self, settings: Settings) -> Array:

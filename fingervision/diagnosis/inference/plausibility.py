@@ -242,8 +242,7 @@ def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Ex
     Exchanged directions are a hypothesis beside the effects: a leading play, with an offset and a ratio, must explain
     half of the disagreement, and its odds against the most probable explanation by effects must be 20 to 1 or more.
     """
-    history = data.chain.history if data.chain.path is None else data.chain.path.history
-    rows = np.arange(history.input_mm.size) if data.chain.path is None else data.chain.path.rows
+    history, rows = data.chain.along.history, data.chain.along.rows
     if history.time_s is None:
         return None
     nothing = problem.nothing()

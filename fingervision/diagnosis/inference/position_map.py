@@ -19,7 +19,7 @@ from fingervision.diagnosis.inference.random_effect import (
     gains_by_size,
     normal_equations,
 )
-from fingervision.domain.effect import Array, History, InputPath
+from fingervision.domain.effect import Array, History
 from fingervision.domain.parameter import Estimate
 from fingervision.effects.position_error_map import EFFECT, covariance, curve_values, without_line
 
@@ -88,9 +88,8 @@ class PositionMap(RandomEffect):
         return replace(self, coefficients=best, rms_mm=Estimate(rms, u, "mm"))
 
 
-def why_no_map(history: History, path: InputPath | None) -> str | None:
-    """Reason why the data cannot show a repeatable map; None if they can."""
-    history = history if path is None else path.history
+def why_no_map(history: History) -> str | None:
+    """Reason why the data cannot show a repeatable map, from their history along the path; None if they can."""
     narrowed = EFFECT.search(history)
     if isinstance(narrowed, str):
         return narrowed

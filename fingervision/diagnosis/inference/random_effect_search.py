@@ -78,8 +78,7 @@ def beside_map(state: Searched, look: Look) -> Searched:
     The map is tried only if the other effects leave an unexplained residual, and with a penalty for its flexibility; if
     an effect with a few parameters fits as well, the effect is kept.
     """
-    history, found = state.data.chain.history, state.found
-    reason = why_no_map(history, state.data.chain.path)
+    found, reason = state.found, why_no_map(state.data.chain.along.history)
     asked = NAME in look.forced
     if reason is not None:
         excluded = {**state.data.excluded, NAME: reason}

@@ -252,7 +252,6 @@ def simulated_errors(data: Observations, rng: np.random.Generator) -> Iterator[A
     if time_s is None:
         return
     path_mm, step_mm = record.along_mm, record.step_mm
-    rows = np.arange(path_mm.size) if data.table.path is None else data.table.path.rows
     noise_mm = float(np.sqrt(max(0.0, record.sigma_mm**2 - step_mm**2 / 12.0)))
     noise_mm = noise_mm if noise_mm > BARELY * record.sigma_mm else 0.0
     for _ in range(int(np.clip(MOST_ROWS // path_mm.size, FEWEST_RECORDS, RECORDS))):
@@ -261,4 +260,4 @@ def simulated_errors(data: Observations, rng: np.random.Generator) -> Iterator[A
             zero = rng.random()
             read_mm = (np.round(read_mm / step_mm - zero) + zero) * step_mm
         again = SmoothedRecord.known(read_mm, time_s, runs, record.sigma_mm, step_mm)
-        yield (again.path_mm - path_mm)[rows]
+        yield (again.path_mm - path_mm)[data.table.path_rows]

@@ -16,6 +16,7 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import HOLDS_S, FunctionModel
+from fingervision.motion.input_path import recorded
 
 PREPARED_S = HOLDS_S[0]
 """Time for which the model is held at a run's first input before the run starts."""
@@ -36,14 +37,14 @@ def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[Correct
             f"{model.base_path} computes the gap from the input over time, but the measured table has no column "
             "time_s: add it, or give a table of static gaps as the model."
         )
-    inputs = table.input_mm if table.path is None else table.path.input_mm
+    inputs, _, _ = recorded(table)
     static = model.base.at_rest(float(inputs.min()), float(inputs.max()))
     return replace(model, base=static, input_range_mm=static.input_range_mm), model.base
 
 
 def with_dynamics(chain: MeasuringChain, function: FunctionModel, settings: Settings) -> MeasuringChain:
     """Add the difference between a dynamic model and its static response, along the path after the drive effects."""
-    history = chain.history if chain.path is None else chain.path.history
+    history = chain.along.history
     driven_mm = _behind_drive(chain, history, {**chain.fixed, **settings})
     jobs = []
     for run in history.runs:

@@ -336,8 +336,7 @@ class Observations:
         step = SMALL_TURN * (ranges[:, 1] - ranges[:, 0]) * np.where(short_by < ranges.mean(axis=1), 1.0, -1.0)
         change = self.turned(short_by + step).chain.stacked(values) - self.chain.stacked(values)
         after = np.array([corner.after for corner in self.turns.reversals])
-        rows = np.arange(n) if self.table.path is None else self.table.path.rows
-        latest = np.searchsorted(after, rows, side="left") - 1
+        latest = np.searchsorted(after, self.table.path_rows, side="left") - 1
         for begin in range(0, change.size, n):
             known = np.flatnonzero(latest >= 0)
             columns[begin + known, latest[known]] = change[begin + known] / step[latest[known]]

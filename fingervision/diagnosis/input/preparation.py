@@ -179,9 +179,8 @@ def _visits(table: MeasuredTable) -> NDArray[np.intp] | None:
     if not mostly_at_rest(table):
         return None
     along_mm, _, along_runs = recorded_rows(table)
-    rows = np.arange(table.input_mm.size) if table.path is None else table.path.rows
-    sided = visits(along_mm, along_runs, rows)
-    return sided if repeats_in(sided, table.runs) >= FEWEST_DEGREES else visits(along_mm, along_runs, rows, first=True)
+    sided, first = (visits(along_mm, along_runs, table.path_rows, first=first) for first in (False, True))
+    return sided if repeats_in(sided, table.runs) >= FEWEST_DEGREES else first
 
 
 def _notes_on_input(table: MeasuredTable, recorded: RecordedInput) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.report.html_parts import table
 from fingervision.diagnosis.report.positioning_accuracy import Figure, PositioningAccuracy, Visits, positioning_accuracy
 from fingervision.domain.effect import Array, Flags, Values
+from fingervision.motion.input_path import recorded
 from fingervision.motion.repeated_targets import NoRepeatedTargets, RepeatedTargets, repeated_targets
 
 # Positioning accuracy in a diagnosis: as measured, corrected for the named effects, and the share of each effect.
@@ -358,15 +359,12 @@ def positioning_of_data(data: Observations, answer: Settings) -> PositioningRepo
     def predict_mm(acting: Settings) -> Array:
         return np.asarray(data.chain.stacked(acting)[:rows], dtype=np.float64)
 
-    if table.path is None:
-        path = (table.input_mm, np.ones(rows, dtype=bool), table.runs, table.time_s)
-    else:
-        measured = np.zeros(table.path.input_mm.size, dtype=bool)
-        measured[table.path.rows] = True
-        path = (table.path.input_mm, measured, table.path.runs, table.path.time_s)
-    if table.time_s is None:
+    along_mm, time_s, runs = recorded(table)
+    if time_s is None:
         return NoRepeatedTargets("the table has no time_s, and without times the order of the rows is unknown")
-    return positioning_of_table(*path, table.gap_mm, predict_mm, answer)
+    measured = np.zeros(along_mm.size, dtype=bool)
+    measured[table.path_rows] = True
+    return positioning_of_table(along_mm, measured, runs, time_s, table.gap_mm, predict_mm, answer)
 
 
 def positioning_section(found: PositioningReport | NoRepeatedTargets) -> dict[str, object]:
