@@ -110,17 +110,13 @@ class Problem:
 
     def beside(self, columns_mm: Array) -> "Problem":
         """Return the problem with further columns of random effects, which come first; shape (m, k) (mm)."""
-        drawn = self.whitener.drawing
-        columns = columns_mm if drawn is None else np.hstack([columns_mm, drawn])
-        return self.with_drawing(columns)
+        return self._with_random(np.hstack([columns_mm, self.whitener.random_mm]))
 
     def without_first(self, count: int) -> "Problem":
         """Return the problem without the first columns of its random effects."""
-        drawn = self.whitener.drawing
-        return self.with_drawing(None if drawn is None or drawn.shape[1] == count else drawn[:, count:])
+        return self._with_random(self.whitener.random_mm[:, count:])
 
-    def with_drawing(self, columns_mm: Array | None) -> "Problem":
-        """Return the problem with other columns of random effects."""
+    def _with_random(self, columns_mm: Array) -> "Problem":
         return replace(self, offsets=RunOffsets.of(replace(self.whitener, drawing=columns_mm)))
 
     def parameters(self, names: tuple[str, ...]) -> list[tuple[str, Parameter]]:

@@ -162,7 +162,7 @@ def _findings(state: SearchState, forced: frozenset[str]) -> Findings:
     problem, best, nothing = state.problem, state.best, state.nothing
     alternatives, distances = [best], dict[tuple[str, ...], float]()
     if best.names:
-        alternatives, distances = _indistinguishable(state) if not forced else _with_required(state, forced)
+        alternatives, distances = _indistinguishable(state, forced)
     alternatives = beside_foretold(problem, alternatives)
     best = min(alternatives, key=lambda e: odds(problem, e)) if best.names else best
     alternatives.sort(key=lambda e: e is not best)
@@ -197,26 +197,27 @@ def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     required = {e.names[0]: e.values[e.names[0]] for e in state.singles if e.names[0] in able}
     # The required effects are added to every explanation that the data do not distinguish from the best; if they were
     # added to the best only, rounding errors would choose among explanations that are equal.
-    bases = _indistinguishable(state)[0] if state.best.names else [state.best]
+    bases = _indistinguishable(state, frozenset())[0] if state.best.names else [state.best]
     begins = [required | dict(base.values) for base in bases]
     together = [fit(problem, tuple(begin), begin, iterations=20) for begin in begins]
     peers = [*holding, *together]
     return replace(state, best=likeliest(peers), peers=peers, imitation=None)
 
 
-def _indistinguishable(state: SearchState) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
-    """Collect the explanations that the data cannot distinguish from the best, and their distances from it."""
-    pool = [*state.singles, *state.peers] if len(state.best.names) > 1 else state.singles
-    return ambiguity_set(state.problem, state.best, state.nothing, pool, state.pairs)
-
-
-def _with_required(
+def _indistinguishable(
     state: SearchState, forced: frozenset[str]
 ) -> tuple[list[Explanation], dict[tuple[str, ...], float]]:
-    """Collect the indistinguishable explanations among those that contain every effect that the user requires."""
+    """Collect the explanations with the required effects that the data cannot distinguish from the best.
+
+    Also returned are the distances of explanations from the best.
+    """
     able = forced & set(state.problem.effects)
-    pool = [peer for peer in state.peers if able <= set(peer.names)]
-    return ambiguity_set(state.problem, state.best, state.nothing, pool, [])
+    if forced:
+        pool, pairs = [peer for peer in state.peers if able <= set(peer.names)], list[Explanation]()
+    else:
+        pool = [*state.singles, *state.peers] if len(state.best.names) > 1 else state.singles
+        pairs = state.pairs
+    return ambiguity_set(state.problem, state.best, state.nothing, pool, pairs)
 
 
 QUIET = 3.0 * 2.0**0.5

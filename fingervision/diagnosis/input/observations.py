@@ -250,8 +250,6 @@ class Observations:
         if stamps is not None and np.any(stamps > SEEN_STAMPS * noises[0].total_mm):
             passing = np.hypot(passing, stamps)
         random = self.random_effects_mm(values)
-        beside = np.hstack(list(random.values()))
-        drawing = beside if beside.shape[1] else None
         whitener = Whitener(
             history,
             noises,
@@ -259,7 +257,7 @@ class Observations:
             held,
             self.recorded.samples,
             passing,
-            drawing,
+            np.hstack(list(random.values())),
         )
         share = FORM_SHARE_OF_RIGS if known else SMALL_SHARE
         offsets = RunOffsets.of(whitener)

@@ -77,10 +77,8 @@ class RunOffsets:
                 columns[channel * n + run.start : channel * n + run.stop, channel * runs + index] = 1.0
         if free:
             columns[n : 2 * n, -1] = 1.0
-        drawn = 0 if whitener.drawing is None else whitener.drawing.shape[1]
-        if whitener.drawing is not None:
-            columns = np.hstack([columns, whitener.drawing])
-        design = whitener.columns(columns)[0]
+        drawn = whitener.random_mm.shape[1]
+        design = whitener.columns(np.hstack([columns, whitener.random_mm]))[0]
         scales = tuple(noise.total_mm for noise in whitener.noises)
         return cls(design, design.T @ design, channels, runs, bool(free), scales, drawn)
 

@@ -45,6 +45,11 @@ class Whitener:
     drawing: Array | None = None
     _filter: tuple[Array, Array, float] = field(init=False, repr=False)
 
+    @property
+    def random_mm(self) -> Array:
+        """Columns of the random effects; shape (channels * n, p)."""
+        return np.zeros((self.aside.size, 0)) if self.drawing is None else self.drawing
+
     def __post_init__(self) -> None:
         """Compute the filter's gains once, because they are the same for every prediction of a search."""
         history = self.history
