@@ -169,19 +169,18 @@ def level_halts(time_s: Array, reading_mm: Array, smooth_mm: Array, step_mm: flo
         level_mm = float(reading_mm[begin])
         rows, path = slice(begin, end + 1), np.full(end + 1 - begin, level_mm)
         lines = []
-        if k:
-            line = stroke(time_s, reading_mm, begin, np.arange(begin, -1, -1), step_mm)
+        # The strokes that end and begin at the halt: row, way to go from it, and time that one reading lasted there.
+        sides = [(begin, -1, before_s)] * (k > 0) + [(end, 1, after_s)] * (k + 1 < first.size)
+        for row, way, lasted_s in sides:
+            beyond = np.arange(row, -1 if way < 0 else reading_mm.size, way)
+            line = stroke(time_s, reading_mm, row, beyond, step_mm)
             if line is None:
-                line = _entering(begin, level_mm - float(reading_mm[begin - 1]), step_mm / before_s, level_mm, step_mm)
-            rows, path = slice(line.nearest, rows.stop), np.append(np.full(begin - line.nearest, level_mm), path)
-            path = _joined(path, line, time_s[rows] - time_s[begin], level_mm, is_leaving=False)
-            lines.append(line)
-        if k + 1 < first.size:
-            line = stroke(time_s, reading_mm, end, np.arange(end, reading_mm.size), step_mm)
-            if line is None:
-                line = _entering(end, level_mm - float(reading_mm[end + 1]), -step_mm / after_s, level_mm, step_mm)
-            rows, path = slice(rows.start, line.nearest + 1), np.append(path, np.full(line.nearest - end, level_mm))
-            path = _joined(path, line, time_s[rows] - time_s[end], level_mm, is_leaving=True)
+                came_mm = level_mm - float(reading_mm[row + way])
+                line = _entering(row, came_mm, -way * step_mm / lasted_s, level_mm, step_mm)
+            held = np.full(abs(row - line.nearest), level_mm)
+            path = np.append(held, path) if way < 0 else np.append(path, held)
+            rows = slice(line.nearest, rows.stop) if way < 0 else slice(rows.start, line.nearest + 1)
+            path = _joined(path, line, time_s[rows] - time_s[row], level_mm, is_leaving=way > 0)
             lines.append(line)
         if np.max(np.abs(path - reading_mm[rows])) <= allowed_mm(step_mm, *lines):
             out[rows] = path
