@@ -119,6 +119,11 @@ class History:
         return rates
 
     @cached_property
+    def travel_mm(self) -> float:
+        """Way of the recorded input within the runs, there and back (mm)."""
+        return sum(float(np.sum(np.abs(np.diff(self.input_mm[run])))) for run in self.runs)
+
+    @cached_property
     def input_span_mm(self) -> float:
         """Difference between the largest and smallest recorded input (mm)."""
         return float(np.ptp(self.input_mm))

@@ -190,6 +190,12 @@ def standing_still(history: History, least_rows: int) -> tuple[slice, ...]:
     return tuple(stretch for stretch in found if stretch.stop - stretch.start >= least_rows)
 
 
+def settled_halves(input_mm: Array, run: slice) -> list[slice]:
+    """Second halves of the stretches of a run in which a command keeps its value, when the stage has settled."""
+    borders = [run.start, *(run.start + 1 + np.flatnonzero(np.diff(input_mm[run]))), run.stop]
+    return [slice(int(begin + (end - begin) // 2), int(end)) for begin, end in pairwise(borders) if end - begin >= 2]
+
+
 def scatter_in_holds(history: History, residual_mm: Array) -> float:
     """Standard deviation of a residual in the second halves of stops, when the stage has settled (mm).
 
@@ -200,14 +206,9 @@ def scatter_in_holds(history: History, residual_mm: Array) -> float:
     residual_mm : ndarray of float, shape (n,)
         Residual of one channel.
     """
-    total, degrees = 0.0, 0
-    for run in history.runs:
-        borders = [run.start, *(run.start + 1 + np.flatnonzero(np.diff(history.input_mm[run]))), run.stop]
-        for begin, end in pairwise(borders):
-            settled = residual_mm[begin + (end - begin) // 2 : end]
-            if settled.size >= 2:
-                total += float(np.sum((settled - settled.mean()) ** 2))
-                degrees += settled.size - 1
+    settled = [residual_mm[half] for run in history.runs for half in settled_halves(history.input_mm, run)]
+    total = sum(float(np.sum((values - values.mean()) ** 2)) for values in settled)
+    degrees = sum(values.size - 1 for values in settled)
     return float(np.sqrt(total / degrees)) if degrees else np.inf
 
 

@@ -24,7 +24,7 @@ from fingervision.domain.effect import Array, DriveEffect, split_key
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.parameter import Estimate
-from fingervision.domain.report import DiagnosisReport, NamedEffect, Verdict
+from fingervision.domain.report import NamedEffect, Verdict
 from fingervision.effects import catalogue
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.physical_gripper import GAP as GAP_PAIR
@@ -283,7 +283,7 @@ def diagnose_with_bodies(
     if evidence is None:
         return _noted(first, notes)
     findings = evidence.findings
-    first = replace(first, report=replace(first.report, where=_where(first.report, evidence, answers)))
+    first = replace(first, report=replace(first.report, where=(*first.report.where, *body_places(evidence, answers))))
     if not findings.members or findings.structure:
         notes = (*notes, _nothing_named(evidence))
         return measured_bodies(_noted(first, notes), evidence)
@@ -387,7 +387,3 @@ def _nothing_named(evidence: BodyEvidence) -> str:
     return (
         f"poses of bodies ({compared}) agree with the drawing: no hinge, link or pivot differs by a detectable amount."
     )
-
-
-def _where(report: DiagnosisReport, evidence: BodyEvidence, answers: PlaceAnswers) -> tuple:  # type: ignore[type-arg]
-    return (*report.where, *body_places(evidence, answers))

@@ -6,6 +6,7 @@ import numpy as np
 
 from fingervision.diagnosis.design.protocols import REZERO, Step, measured_ends, protocols
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.position_map import PASSES
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import History, PointEffect
 from fingervision.domain.further_check import FurtherCheck
@@ -24,8 +25,6 @@ SECOND_SPEED = 2.0
 """Least ratio of two speeds that tells a lag from a play."""
 HOLD_SHARE = 0.05
 """Least share of the longest run that a hold must last to show what goes on while the input is held."""
-TWICE = 1.8
-"""Least ratio of travel to range with which each position was passed twice."""
 MOST_ADVICE = 2
 """Pieces of advice in one sentence, the most important ones: a reader does one thing at a time."""
 
@@ -78,7 +77,7 @@ def lacking(data: Observations) -> list[str]:
         advice.append(
             "drive the range in the other direction too, which tells play and friction from errors of position"
         )
-    elif _travel_mm(history) < TWICE * history.input_span_mm:
+    elif history.travel_mm < PASSES * history.input_span_mm:
         advice.append("come back to each position, which tells an error of position from a change over time")
     if data.repeats is None and history.dwell_s > 0.0:
         advice.append("read each position at least three times from the same side, which shows the noise itself")
@@ -93,10 +92,6 @@ def lacking(data: Observations) -> list[str]:
 
 def _apart_s(history: History, run: slice) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.maximum(np.diff(history.times[run]), 1e-9)
-
-
-def _travel_mm(history: History) -> float:
-    return sum(float(np.sum(np.abs(np.diff(history.input_mm[run])))) for run in history.runs)
 
 
 def _goes_both_ways(history: History) -> bool:

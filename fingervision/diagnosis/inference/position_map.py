@@ -100,8 +100,7 @@ def why_no_map(history: History) -> str | None:
         holds = sum(1 + int(np.count_nonzero(np.diff(history.input_mm[run]))) for run in history.runs)
         if holds < PASSES * np.unique(history.input_mm).size:
             return "most set-points were commanded only once, so that the repeatability of their errors is unknown"
-    travel = sum(float(np.sum(np.abs(np.diff(history.input_mm[run])))) for run in history.runs)
-    if travel < PASSES * history.input_span_mm:
+    if history.travel_mm < PASSES * history.input_span_mm:
         return "each position was passed only once, so that the repeatability of its error is unknown"
     return None
 

@@ -39,7 +39,7 @@ from fingervision.domain.model import PhysicalModel
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, Disagreement, NamedEffect, Verdict
 from fingervision.effects import catalogue
-from fingervision.motion.recorded_input import LEAST_HOLD
+from fingervision.motion.recorded_input import LEAST_HOLD, settled_halves
 
 # Advise to measure the force, if it would separate explanations that the gap cannot separate.
 
@@ -215,9 +215,7 @@ def _holds(history: History, error_mm: Array, path_mm: Array) -> tuple[Array, Ar
     """
     out: list[tuple[float, float, float, float, float]] = []
     for run in history.runs:
-        borders = [run.start, *(run.start + 1 + np.flatnonzero(np.diff(history.input_mm[run]))), run.stop]
-        settled = [slice(begin + (end - begin) // 2, end) for begin, end in pairwise(borders) if end - begin >= 2]
-        for one, other in pairwise(settled):
+        for one, other in pairwise(settled_halves(history.input_mm, run)):
             if min(one.stop - one.start, other.stop - other.start) < LEAST_HOLD // 2:
                 continue
             step = float(history.input_mm[other.start] - history.input_mm[one.start])
