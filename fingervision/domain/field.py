@@ -12,6 +12,8 @@ from math import inf
 from types import NoneType
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+from fingervision.domain.errors import DataError
+
 
 @dataclass(frozen=True, slots=True)
 class Field:
@@ -110,6 +112,18 @@ def _declared(record: Any) -> tuple[Declared, ...]:
         is_required = each.default is MISSING and each.default_factory is MISSING
         found.append(Declared(each.name, kind, is_optional, field, is_required))
     return tuple(found)
+
+
+class Limited:
+    """A record that cannot be made with a number beyond the limits that its fields declare."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        for each in declared(type(self)):
+            value = getattr(self, each.name)
+            if isinstance(value, int | float) and (words := each.field.refusal(value)) is not None:
+                raise DataError(f"{each.name} {words}.")
 
 
 def names_of(record: Any) -> tuple[str, ...]:

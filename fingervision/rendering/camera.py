@@ -1,11 +1,13 @@
 """The camera model between the ideal scene and the frame: tilt, lens, edge bias, blur and noise."""
 
 from dataclasses import dataclass
-from math import cos, hypot, isfinite, radians, sin
+from math import cos, hypot, radians, sin
+from typing import Annotated
 
 import numpy as np
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.field import Field, Limited
 from fingervision.rendering.outline import Line, Outline, Piece, Points, biarcs
 
 # Effect of tilt and lens on an outline: the perspective of a tilted plane, then radial distortion.
@@ -45,15 +47,14 @@ class RadialLens:
     def __post_init__(self) -> None:
         q2 = np.linspace(0.0, DISTORTED_TO, 31) ** 2
         if not np.min(1 + 3 * self.k1 * q2 + 5 * self.k2 * q2**2) > 0.0:
-            msg = (
+            raise DataError(
                 f"A lens distortion must be invertible within {DISTORTED_TO:g} half diagonals of the frame, but k1 = "
                 f"{self.k1:g} with k2 = {self.k2:g} is not: choose coefficients nearer to 0."
             )
-            raise DataError(msg)
 
 
 @dataclass(frozen=True, slots=True)
-class Tilt:
+class Tilt(Limited):
     """A plane that is not perpendicular to the optical axis; the scale at the frame's centre is unchanged.
 
     Parameters
@@ -71,18 +72,9 @@ class Tilt:
         If the camera is not in front of the plane, or sees it edge on.
     """
 
-    about_x_deg: float = 0.0
-    about_y_deg: float = 0.0
-    distance_px: float = 3400.0
-
-    def __post_init__(self) -> None:
-        turns_deg = (abs(self.about_x_deg), abs(self.about_y_deg))
-        if not (max(turns_deg) <= 45.0 and self.distance_px > 0.0):
-            msg = (
-                f"A tilt must be at most 45 degrees, seen from a positive distance, but is {self.about_x_deg:g} and "
-                f"{self.about_y_deg:g} degrees from {self.distance_px:g} px."
-            )
-            raise DataError(msg)
+    about_x_deg: Annotated[float, Field(unit="degrees", low=-45.0, high=45.0)] = 0.0
+    about_y_deg: Annotated[float, Field(unit="degrees", low=-45.0, high=45.0)] = 0.0
+    distance_px: Annotated[float, Field(above=0.0)] = 3400.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +126,7 @@ LEAST_BLUR_PX = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Camera:
+class Camera(Limited):
     """Camera model; the parameters are listed in the order in which they act on the light from the scene.
 
     Parameters
@@ -164,32 +156,21 @@ class Camera:
         If blur, noise, edge bias, bit depth or tint has an impossible value.
     """
 
-    blur_px: float = 0.9
-    noise_grey: float = 0.0
-    shot_grey: float = 0.0
-    bloom_px: float = 0.0
+    blur_px: Annotated[float, Field(low=LEAST_BLUR_PX)] = 0.9
+    noise_grey: Annotated[float, Field(low=0.0)] = 0.0
+    shot_grey: Annotated[float, Field(low=0.0)] = 0.0
+    bloom_px: Annotated[float, Field(hint="give a number of pixels")] = 0.0
     tilt: Tilt | None = None
     lens: RadialLens | None = None
     bits: int = 8
     tint: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.blur_px) and self.blur_px >= LEAST_BLUR_PX):
-            msg = f"blur_px must be at least {LEAST_BLUR_PX}, but is {self.blur_px:g}."
-            raise DataError(msg)
-        for name, value in (("noise_grey", self.noise_grey), ("shot_grey", self.shot_grey)):
-            if not (isfinite(value) and value >= 0.0):
-                msg = f"{name} must be 0 or more, but is {value:g}."
-                raise DataError(msg)
-        if not isfinite(self.bloom_px):
-            msg = f"bloom_px must be a number of pixels, but is {self.bloom_px:g}."
-            raise DataError(msg)
+        Limited.__post_init__(self)
         if self.bits not in (8, 16):
-            msg = f"bits must be 8 or 16, but is {self.bits}."
-            raise DataError(msg)
+            raise DataError(f"bits must be 8 or 16, but is {self.bits}.")
         if self.tint is not None and (len(tuple(self.tint)) != 3 or min(self.tint) < 0.0):
-            msg = f"tint must be three factors of 0 or more, for red, green and blue, but is {self.tint}."
-            raise DataError(msg)
+            raise DataError(f"tint must be three factors of 0 or more, for red, green and blue, but is {self.tint}.")
 
     def sees(self, outlines: tuple[Outline, ...], width_px: int, height_px: int) -> tuple[Outline, ...]:
         """Map outlines from the ideal picture to the camera's picture by tilt and lens, without edge bias and blur."""

@@ -89,17 +89,13 @@ class Finger:
     direction: Direction
 
 
-def axis_motion(direction: Direction) -> Motion:
-    """Map from (across, towards the root) to (x, y): across is x to the right or y downwards."""
-    match direction:
-        case Direction.UP:
-            return Motion()
-        case Direction.DOWN:
-            return Motion(yy=-1.0)
-        case Direction.LEFT:
-            return Motion(0.0, 1.0, 1.0, 0.0)
-        case Direction.RIGHT:
-            return Motion(0.0, -1.0, 1.0, 0.0)
+AXES = {
+    Direction.UP: Motion(),
+    Direction.DOWN: Motion(yy=-1.0),
+    Direction.LEFT: Motion(0.0, 1.0, 1.0, 0.0),
+    Direction.RIGHT: Motion(0.0, -1.0, 1.0, 0.0),
+}
+"""Maps from (across, towards the root) to (x, y): across is x to the right or y downwards."""
 
 
 def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 0.0) -> Outline:
@@ -128,24 +124,22 @@ def finger_shape(width_px: float, length_px: float, tip: Tip, tilt_deg: float = 
     """
     half = width_px / 2
     if not (width_px > 0.0 and length_px > 0.0):
-        msg = f"A finger's width and length must be positive, but are {width_px:g} px and {length_px:g} px."
-        raise DataError(msg)
+        raise DataError(f"A finger's width and length must be positive, but are {width_px:g} px and {length_px:g} px.")
     if not abs(tilt_deg) <= STEEPEST_DEG:
-        msg = (
+        raise DataError(
             f"A finger's tilt must be at most {STEEPEST_DEG:g} degrees, but is {tilt_deg:g}: choose another direction."
         )
-        raise DataError(msg)
     if isinstance(tip, SquareTip):
         if not abs(tip.slant_deg) <= STEEPEST_DEG:
-            msg = f"A tip's slant must be at most {STEEPEST_DEG:g} degrees, but is {tip.slant_deg:g}."
-            raise DataError(msg)
+            raise DataError(f"A tip's slant must be at most {STEEPEST_DEG:g} degrees, but is {tip.slant_deg:g}.")
         rise = half * tan(radians(tip.slant_deg))
         corners = ((half, length_px), (-half, length_px), (-half, rise), (half, -rise))
         shape = polygon(corners, (0.0, 0.0, tip.radius_px, tip.radius_px))
     else:
         if not 0.0 < tip.height_px < length_px:
-            msg = f"An elliptic tip's height must lie between 0 and the finger's length, but is {tip.height_px:g} px."
-            raise DataError(msg)
+            raise DataError(
+                f"An elliptic tip's height must lie between 0 and the finger's length, but is {tip.height_px:g} px."
+            )
         sides: list[Piece] = [
             Line(half, tip.height_px, half, length_px),
             Line(half, length_px, -half, length_px),

@@ -9,7 +9,7 @@ from itertools import pairwise
 from math import atan2, ceil, cos, floor, hypot, pi, sin, sqrt, tan
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fingervision.domain.errors import DataError
 
@@ -57,6 +57,10 @@ class Motion:
         """Position of a point after the motion."""
         return (self.xx * x_px + self.xy * y_px + self.x_px, self.yx * x_px + self.yy * y_px + self.y_px)
 
+    def before(self, points: Points | tuple[float, float]) -> Points:
+        """Points, shape (..., 2), before this motion, which has no shift."""
+        return np.asarray(points @ np.array([[self.xx, self.xy], [self.yx, self.yy]]))
+
 
 # A straight piece of an outline.
 
@@ -91,7 +95,7 @@ class Line:
         (x0, y0), (x1, y1) = self.start, self.end
         return (min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
 
-    def points(self, t: NDArray[np.float64]) -> Points:
+    def points(self, t: ArrayLike) -> Points:
         """Points at the fractions `t` of the length, shape (n, 2)."""
         t = np.asarray(t, dtype=np.float64)
         x = self.x0_px + t * (self.x1_px - self.x0_px)
@@ -166,7 +170,7 @@ class Arc:
         y = [self.start[1], self.end[1]] + [self.y_px + self.radius_px * sin(angle) for angle in passed]
         return (min(x), min(y), max(x), max(y))
 
-    def points(self, t: NDArray[np.float64]) -> Points:
+    def points(self, t: ArrayLike) -> Points:
         """Points at the fractions `t` of the length, shape (n, 2)."""
         angle = self.start_rad + np.asarray(t, dtype=np.float64) * self.sweep_rad
         x = self.x_px + self.radius_px * np.cos(angle)
@@ -224,12 +228,11 @@ class Outline:
         for piece, follower in zip(self.pieces, self.pieces[1:] + self.pieces[:1], strict=True):
             hole_px = hypot(follower.start[0] - piece.end[0], follower.start[1] - piece.end[1])
             if hole_px > SAME_POINT_PX:
-                msg = (
+                raise DataError(
                     f"An outline must be closed, but a piece ends {hole_px:.3g} px away from the start of the next "
                     "piece: "
                     "give the pieces in their order along the outline."
                 )
-                raise DataError(msg)
 
     @property
     def area_px2(self) -> float:
@@ -360,8 +363,7 @@ def disc(x_px: float, y_px: float, radius_px: float) -> Outline:
         If the radius is not positive.
     """
     if not radius_px > 0.0:
-        msg = f"radius_px of a disc must be positive, but is {radius_px:g}."
-        raise DataError(msg)
+        raise DataError(f"radius_px of a disc must be positive, but is {radius_px:g}.")
     return Outline((Arc(x_px, y_px, radius_px, 0.0, 2 * pi),))
 
 

@@ -201,15 +201,14 @@ def exact_grey(scene: Scene, camera: Camera) -> NDArray[np.float64]:
 
 def with_noise(grey: NDArray[np.float64], camera: Camera, rng: np.random.Generator) -> NDArray[np.float64]:
     """Add white noise, and shot noise if the camera has it."""
-    if camera.shot_grey > 0.0:
-        spread = np.sqrt(camera.noise_grey**2 + camera.shot_grey * np.maximum(grey, 0.0))
-        return grey + spread * rng.standard_normal(grey.shape)
-    if camera.noise_grey > 0.0:
-        noise = rng.standard_normal(grey.shape)
-        noise *= camera.noise_grey
-        noise += grey
-        return noise
-    return grey
+    shot = camera.shot_grey * np.maximum(grey, 0.0) if camera.shot_grey else 0.0
+    variance = camera.noise_grey**2 + shot
+    if not np.any(variance):
+        return grey
+    noise = rng.standard_normal(grey.shape)
+    noise *= np.sqrt(variance)
+    noise += grey
+    return noise
 
 
 def digitised(grey: NDArray[np.float64], camera: Camera) -> Pixels:

@@ -9,6 +9,9 @@ import numpy as np
 from fingervision.domain.errors import DataError
 from fingervision.rendering.outline import SAME_POINT_PX, Arc, Line, Outline, Piece, bridged
 
+Place = tuple[float, float]
+"""A point in the picture: x and y (px)."""
+
 # Outline of the union of several solids; two touching fingers, for example, are one object.
 
 
@@ -98,7 +101,7 @@ def _boxes_meet(a: Outline, b: Outline) -> bool:
 
 def _crossings(piece: Piece, edge: Piece) -> list[float]:
     """Fractions of `piece` at which `edge` crosses it."""
-    points: Sequence[tuple[float, float]]
+    points: Sequence[Place]
     if _same_track(piece, edge):
         points = (edge.start, edge.end)
     elif isinstance(piece, Line) and isinstance(edge, Line):
@@ -131,7 +134,7 @@ def _on(t: float, piece: Piece) -> bool:
     return -margin <= t <= 1.0 + margin
 
 
-def _line_circle(line: Line, arc: Arc) -> list[tuple[float, float]]:
+def _line_circle(line: Line, arc: Arc) -> list[Place]:
     length = line.length_px
     ux, uy = (line.x1_px - line.x0_px) / length, (line.y1_px - line.y0_px) / length
     wx, wy = arc.x_px - line.x0_px, arc.y_px - line.y0_px
@@ -142,7 +145,7 @@ def _line_circle(line: Line, arc: Arc) -> list[tuple[float, float]]:
     return [(line.x0_px + s * ux, line.y0_px + s * uy) for s in (along - half, along + half)]
 
 
-def _circle_circle(a: Arc, b: Arc) -> list[tuple[float, float]]:
+def _circle_circle(a: Arc, b: Arc) -> list[Place]:
     distance = hypot(b.x_px - a.x_px, b.y_px - a.y_px)
     ra, rb = abs(a.radius_px), abs(b.radius_px)
     if distance == 0.0 or not abs(ra - rb) < distance < ra + rb:
@@ -158,7 +161,7 @@ def _circle_circle(a: Arc, b: Arc) -> list[tuple[float, float]]:
     ]
 
 
-def _fraction(piece: Piece, point: tuple[float, float]) -> float | None:
+def _fraction(piece: Piece, point: Place) -> float | None:
     """Fraction of the piece at which a point lies; None beyond the piece's ends."""
     x, y = point
     if isinstance(piece, Line):
@@ -192,7 +195,7 @@ def _chained(pieces: list[Piece]) -> tuple[Outline, ...]:
     return tuple(curves)
 
 
-def polygon(corners: tuple[tuple[float, float], ...], radii_px: tuple[float, ...] | None = None) -> Outline:
+def polygon(corners: tuple[Place, ...], radii_px: tuple[float, ...] | None = None) -> Outline:
     """Solid polygon with rounded corners.
 
     Parameters
@@ -214,50 +217,46 @@ def polygon(corners: tuple[tuple[float, float], ...], radii_px: tuple[float, ...
         neighbours.
     """
     if len(corners) < 3:
-        msg = f"A polygon must have at least 3 corners, but has {len(corners)}."
-        raise DataError(msg)
+        raise DataError(f"A polygon must have at least 3 corners, but has {len(corners)}.")
     sides_px = [hypot(x - corners[i - 1][0], y - corners[i - 1][1]) for i, (x, y) in enumerate(corners)]
     if not min(sides_px) > SAME_POINT_PX:
-        msg = f"A polygon's sides must have a length, but the shortest has {min(sides_px):.3g} px."
-        raise DataError(msg)
+        raise DataError(f"A polygon's sides must have a length, but the shortest has {min(sides_px):.3g} px.")
     radii = (0.0,) * len(corners) if radii_px is None else radii_px
     if not min(radii) >= 0.0:
-        msg = f"A corner's radius must be 0 or more, but is {min(radii):g} px."
-        raise DataError(msg)
+        raise DataError(f"A corner's radius must be 0 or more, but is {min(radii):g} px.")
+    followers = (*corners[1:], corners[0])
+    rounded = [
+        _rounded(before, corner, after, radius)
+        for before, corner, after, radius in zip((corners[-1], *corners), corners, followers, radii, strict=False)
+    ]
     pieces: list[Piece] = []
-    entries: list[tuple[float, float]] = []
-    arcs: list[Arc | None] = []
-    exits: list[tuple[float, float]] = []
-    for i, (x, y) in enumerate(corners):
-        before, after = corners[i - 1], corners[(i + 1) % len(corners)]
-        arrive = atan2(y - before[1], x - before[0])
-        turn = (atan2(after[1] - y, after[0] - x) - arrive + pi) % (2 * pi) - pi
-        reach = radii[i] * tan(abs(turn) / 2)
-        side = 1.0 if turn > 0.0 else -1.0
-        entry = (x - reach * cos(arrive), y - reach * sin(arrive))
-        leave = (x + reach * cos(arrive + turn), y + reach * sin(arrive + turn))
-        entries.append(entry)
-        exits.append(leave)
-        if radii[i] > 0.0 and turn != 0.0:
-            centre_x = entry[0] - side * radii[i] * sin(arrive)
-            centre_y = entry[1] + side * radii[i] * cos(arrive)
-            arcs.append(Arc(centre_x, centre_y, radii[i], arrive - side * pi / 2, turn))
-        else:
-            arcs.append(None)
-    for i, arc in enumerate(arcs):
-        follower = (i + 1) % len(corners)
-        if arc is not None:
-            pieces.append(arc)
-        (x0, y0), (x1, y1) = exits[i], entries[follower]
-        side_x, side_y = corners[follower][0] - corners[i][0], corners[follower][1] - corners[i][1]
+    for (_, arcs, (x0, y0)), ((x1, y1), _, _), corner, follower in zip(
+        rounded, rounded[1:] + rounded[:1], corners, followers, strict=True
+    ):
+        pieces += arcs
+        side_x, side_y = follower[0] - corner[0], follower[1] - corner[1]
         along = ((x1 - x0) * side_x + (y1 - y0) * side_y) / hypot(side_x, side_y)
         if along < -SAME_POINT_PX:
-            msg = (
+            raise DataError(
                 f"The corners' radii must fit on the side between them, but overlap by {-along:.3g} px: "
                 "choose smaller radii (at most half the width)."
             )
-            raise DataError(msg)
         if along > SAME_POINT_PX:
             pieces.append(Line(x0, y0, x1, y1))
     outline = Outline(tuple(pieces))
     return outline if outline.area_px2 > 0.0 else outline.backwards()
+
+
+def _rounded(before: Place, corner: Place, after: Place, radius_px: float) -> tuple[Place, list[Arc], Place]:
+    """Where the rounding of a corner begins, its arc (none for a sharp corner), and where it ends."""
+    x, y = corner
+    arrive = atan2(y - before[1], x - before[0])
+    turn = (atan2(after[1] - y, after[0] - x) - arrive + pi) % (2 * pi) - pi
+    reach = radius_px * tan(abs(turn) / 2)
+    entry = (x - reach * cos(arrive), y - reach * sin(arrive))
+    leave = (x + reach * cos(arrive + turn), y + reach * sin(arrive + turn))
+    if radius_px == 0.0 or turn == 0.0:
+        return entry, [], leave
+    side = 1.0 if turn > 0.0 else -1.0
+    centre = (entry[0] - side * radius_px * sin(arrive), entry[1] + side * radius_px * cos(arrive))
+    return entry, [Arc(*centre, radius_px, arrive - side * pi / 2, turn)], leave

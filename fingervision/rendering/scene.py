@@ -2,21 +2,26 @@
 
 from dataclasses import dataclass
 from math import cos, hypot, radians, sin, sqrt
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
 from fingervision.domain.errors import DataError
+from fingervision.domain.field import Field, Limited
 from fingervision.rendering.finger import Finger
 from fingervision.rendering.outline import Motion, Outline
 from fingervision.rendering.polygon import polygon
 
+Level = Annotated[float, Field("grey level", low=0.0, high=255.0)]
+# A steeper slope would make the light negative at a border of the frame.
+Slope = Annotated[float, Field("relative rise of the light across the frame", low=-2.0, high=2.0)]
 # Illumination of the scene: levels of background and fingers, a slope across the frame, a step.
 
 
 @dataclass(frozen=True, slots=True)
-class LightStep:
+class LightStep(Limited):
     """A straight border beyond which the light is stronger or weaker.
 
     Parameters
@@ -29,13 +34,13 @@ class LightStep:
         Direction of the side beyond the border: 0 is to the right, 90 is down.
     """
 
-    factor: float
+    factor: Annotated[float, Field(low=0.0)]
     at_px: float = 0.0
     towards_deg: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Light:
+class Light(Limited):
     """Grey levels of background and fingers, and the variation of light over the frame.
 
     Parameters
@@ -58,22 +63,12 @@ class Light:
         If the light would be negative somewhere in the frame.
     """
 
-    ground: float = 200.0
-    fingers: float = 40.0
-    slope_x: float = 0.0
-    slope_y: float = 0.0
+    ground: Level = 200.0
+    fingers: Level = 40.0
+    slope_x: Slope = 0.0
+    slope_y: Slope = 0.0
     step: LightStep | None = None
-    exposure: float = 1.0
-
-    def __post_init__(self) -> None:
-        factor = 1.0 if self.step is None else self.step.factor
-        if not (abs(self.slope_x) <= 2.0 and abs(self.slope_y) <= 2.0 and factor >= 0.0 and self.exposure >= 0.0):
-            msg = (
-                "The light must not be negative: slopes must lie between -2 and 2, and factors must be 0 or more, but "
-                "slope_x is "
-                f"{self.slope_x:g}, slope_y {self.slope_y:g}, the step {factor:g} and the exposure {self.exposure:g}."
-            )
-            raise DataError(msg)
+    exposure: Annotated[float, Field(low=0.0)] = 1.0
 
     def field(self, width_px: int, height_px: int, blur_px: float) -> NDArray[np.float64] | float:
         """Factor by which the light changes each pixel's grey level; a single number if the light is uniform."""
@@ -97,7 +92,7 @@ EVEN_LIGHT = Light()
 
 
 @dataclass(frozen=True, slots=True)
-class Patch:
+class Patch(Limited):
     """A shape with its own grey level, painted over what is below.
 
     Parameters
@@ -109,11 +104,11 @@ class Patch:
     """
 
     outlines: tuple[Outline, ...]
-    level: float
+    level: Level
 
 
 @dataclass(frozen=True, slots=True)
-class Rim:
+class Rim(Limited):
     """A bright line along the outside of the fingers' edges.
 
     Parameters
@@ -129,17 +124,12 @@ class Rim:
         If the width is not positive.
     """
 
-    width_px: float
-    level: float
-
-    def __post_init__(self) -> None:
-        if not self.width_px > 0.0:
-            msg = f"width_px of a rim must be positive, but is {self.width_px:g}."
-            raise DataError(msg)
+    width_px: Annotated[float, Field(above=0.0)]
+    level: Level
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class Scene(Limited):
     """All objects to be rendered, in the ideal picture without lens distortion, blur or noise.
 
     Parameters
@@ -164,24 +154,12 @@ class Scene:
     """
 
     fingers: tuple[Finger, ...] = ()
-    width_px: int = 640
-    height_px: int = 480
+    width_px: Annotated[int, Field(low=1)] = 640
+    height_px: Annotated[int, Field(low=1)] = 480
     light: Light = EVEN_LIGHT
     behind: tuple[Patch, ...] = ()
     before: tuple[Patch, ...] = ()
     rim: Rim | None = None
-
-    def __post_init__(self) -> None:
-        if self.width_px < 1 or self.height_px < 1:
-            msg = f"A frame must have at least one pixel each way, but is {self.width_px} x {self.height_px}."
-            raise DataError(msg)
-        levels = [self.light.ground, self.light.fingers]
-        levels += [patch.level for patch in self.behind + self.before]
-        levels += [self.rim.level] if self.rim else []
-        for level in levels:
-            if not 0.0 <= level <= 255.0:
-                msg = f"A grey level must lie between 0 and 255, but is {level:g}."
-                raise DataError(msg)
 
 
 # Dust: small dark or light grains anywhere in the frame.
@@ -225,11 +203,10 @@ def dust(
         If a size is not positive, or there is no level to choose from.
     """
     if not (count >= 0 and 0.0 < size_px[0] <= size_px[1] and levels):
-        msg = (
+        raise DataError(
             "The number of grains must be at least 0, their sizes positive, and their grey levels at least one, "
             f"but they are {count}, {size_px} px and {levels}."
         )
-        raise DataError(msg)
     grains = []
     for _ in range(count):
         length = rng.uniform(*size_px)

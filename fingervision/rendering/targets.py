@@ -58,11 +58,10 @@ def slot(
     right, low = frame[0] + BEYOND_FRAME_PX, frame[1] + BEYOND_FRAME_PX
     least_x, least_y, greatest_x, greatest_y = hole.box_px
     if least_x <= left or least_y <= top or greatest_x >= right or greatest_y >= low:
-        msg = (
+        raise DataError(
             f"A slot must lie inside its plate, which ends {BEYOND_FRAME_PX:g} px beyond the frame, but reaches from "
             f"({least_x:g}, {least_y:g}) to ({greatest_x:g}, {greatest_y:g}): choose a shorter slot."
         )
-        raise DataError(msg)
     return polygon(((left, top), (right, top), (right, low), (left, low))), hole.backwards()
 
 
@@ -103,5 +102,4 @@ def chessboard(
 def _must_be_positive(**sizes: float) -> None:
     for name, size in sizes.items():
         if not size > 0.0:
-            msg = f"{name} must be positive, but is {size:g}."
-            raise DataError(msg)
+            raise DataError(f"{name} must be positive, but is {size:g}.")

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from fingervision.domain.direction import Direction
@@ -12,8 +11,8 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.rendering.camera import Camera
-from fingervision.rendering.finger import axis_motion
-from fingervision.rendering.outline import SAME_POINT_PX, Outline, Piece
+from fingervision.rendering.finger import AXES
+from fingervision.rendering.outline import SAME_POINT_PX, Motion, Outline, Piece
 from fingervision.rendering.scene import Scene
 
 # Number of points on each piece that bracket its extremum before the refinement.
@@ -81,22 +80,23 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
     first, second, *others = scene.fingers
     if others or first.direction is not second.direction:
         ways = ", ".join(finger.direction for finger in scene.fingers)
-        msg = f"A scene must have two fingers that point in the same direction, but the directions are {ways}."
-        raise DataError(msg)
-    direction = first.direction
+        raise DataError(
+            f"A scene must have two fingers that point in the same direction, but the directions are {ways}."
+        )
+    direction, axes = first.direction, AXES[first.direction]
     shapes = list(camera.sees((first.outline, second.outline), scene.width_px, scene.height_px))
-    ends = [_tip(shape, direction) for shape in shapes]
+    ends = [_tip(shape, axes) for shape in shapes]
     across_size = scene.width_px if direction.is_vertical else scene.height_px
     if any(end.last_px < -0.5 or end.first_px > across_size - 0.5 for end in ends):
         return NoGap(Status.TIP_OUT_OF_VIEW, "The outermost point of a finger lies outside the frame.")
     tips = [end.along_px for end in ends]
-    spans = [_crossings(shape, direction, tip + below_tip_px) for shape, tip in zip(shapes, tips, strict=True)]
+    spans = [_crossings(shape, axes, tip + below_tip_px) for shape, tip in zip(shapes, tips, strict=True)]
     if not all(spans):
         return NoGap(Status.NO_FINGERS, f"A finger ends less than {below_tip_px:g} px below its tip.")
     if sum(spans[0]) > sum(spans[1]):
         shapes, tips, spans = shapes[::-1], tips[::-1], spans[::-1]
     inner = (max(spans[0]), min(spans[1]))
-    points = [axis_motion(direction).place(across, tip + below_tip_px) for across, tip in zip(inner, tips, strict=True)]
+    points = [axes.place(across, tip + below_tip_px) for across, tip in zip(inner, tips, strict=True)]
     for x_px, y_px in points:
         if not (-0.5 <= x_px <= scene.width_px - 0.5 and -0.5 <= y_px <= scene.height_px - 0.5):
             return NoGap(
@@ -106,30 +106,10 @@ def truth(scene: Scene, camera: Camera, below_tip_px: float) -> TrueGap | NoGap:
     if inner[0] >= inner[1] or any(covered):
         return NoGap(Status.TOUCHING, "The fingers overlap at the measuring height.")
     edges = [
-        TrueEdge(*point, axis_motion(direction).place(0.0, tip)[1 if direction.is_vertical else 0])
+        TrueEdge(*point, axes.place(0.0, tip)[1 if direction.is_vertical else 0])
         for point, tip in zip(points, tips, strict=True)
     ]
     return TrueGap(edges[0], edges[1])
-
-
-def _in_axes(piece: Piece, direction: Direction, t: ArrayLike) -> NDArray[np.float64]:
-    """Coordinates (across, towards the root) of points on a piece, shape (..., 2)."""
-    points = piece.points(np.asarray(t, dtype=np.float64))
-    match direction:
-        case Direction.UP:
-            return points
-        case Direction.DOWN:
-            return points * (1.0, -1.0)
-        case Direction.LEFT:
-            return points[..., ::-1]
-        case Direction.RIGHT:
-            return points[..., ::-1] * (1.0, -1.0)
-
-
-def _along(point: tuple[float, float], direction: Direction) -> float:
-    """Coordinate of a point along the finger, growing towards the finger's root."""
-    along = point[1] if direction.is_vertical else point[0]
-    return along if direction in (Direction.UP, Direction.LEFT) else -along
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,55 +121,55 @@ class _Tip:
     last_px: float
 
 
-def _tip(outline: Outline, direction: Direction) -> _Tip:
+def _tip(outline: Outline, axes: Motion) -> _Tip:
     grid = np.linspace(0.0, 1.0, BRACKET_POINTS)
-    starts = [_along(piece.start, direction) for piece in outline.pieces]
+    starts = [axes.before(piece.start)[1] for piece in outline.pieces]
     outermost_px = min(starts)
     found = []
     for piece, start_px in zip(outline.pieces, starts, strict=True):
         # No point of a piece is further from the piece's start than the piece's length.
         if start_px - piece.length_px > outermost_px:
             continue
-        points = _in_axes(piece, direction, grid)
+        points = axes.before(piece.points(grid))
         place = int(np.argmin(points[:, 1]))
         found.append(points)
 
         def height_px(t: float, piece: Piece = piece) -> float:
-            return float(_in_axes(piece, direction, t)[1])
+            return float(axes.before(piece.points(t))[1])
 
         # The outermost point may lie between the last two points of the grid, so that the grid's ends can be limits of
         # the bracket too.
         bounds = (float(grid[max(place - 1, 0)]), float(grid[min(place + 1, BRACKET_POINTS - 1)]))
         best = float(minimize_scalar(height_px, bounds=bounds, options={"xatol": 1e-10}).x)
-        found.append(_in_axes(piece, direction, [best]))
+        found.append(axes.before(piece.points(np.array([best]))))
     everything = np.concatenate(found)
     along_px = float(everything[:, 1].min())
     across = everything[everything[:, 1] <= along_px + FLAT_PX, 0]
     return _Tip(along_px, float(across.min()), float(across.max()))
 
 
-def _crossings(outline: Outline, direction: Direction, along_px: float) -> list[float]:
+def _crossings(outline: Outline, axes: Motion, along_px: float) -> list[float]:
     """Coordinates across the finger at which the outline crosses the height `along_px`."""
     grid = np.linspace(0.0, 1.0, BRACKET_POINTS)
     crossings = []
     for piece, follower in zip(outline.pieces, outline.pieces[1:] + outline.pieces[:1], strict=True):
-        if abs(_along(piece.start, direction) - along_px) > piece.length_px + SAME_POINT_PX:
+        if abs(axes.before(piece.start)[1] - along_px) > piece.length_px + SAME_POINT_PX:
             continue
 
         def beyond_px(t: float, piece: Piece = piece) -> float:
-            return float(_in_axes(piece, direction, t)[1] - along_px)
+            return float(axes.before(piece.points(t))[1] - along_px)
 
-        beyond = _in_axes(piece, direction, grid)[:, 1] >= along_px
+        beyond = axes.before(piece.points(grid))[:, 1] >= along_px
         # Both pieces at a joint use the same point, so that rounding cannot place the joint on different sides of the
         # line.
-        beyond[0] = _along(piece.start, direction) >= along_px
-        beyond[-1] = _along(follower.start, direction) >= along_px
+        beyond[0] = axes.before(piece.start)[1] >= along_px
+        beyond[-1] = axes.before(follower.start)[1] >= along_px
         for k in np.flatnonzero(beyond[:-1] != beyond[1:]):
             low, high = float(grid[k]), float(grid[k + 1])
             at_joint = (beyond_px(low) >= 0.0) == (beyond_px(high) >= 0.0)
             nearer = min(low, high, key=lambda t: abs(beyond_px(t)))
             t = nearer if at_joint else brentq(beyond_px, low, high, xtol=1e-14)
-            crossings.append(float(_in_axes(piece, direction, t)[0]))
+            crossings.append(float(axes.before(piece.points(t))[0]))
     return crossings
 
 
@@ -215,9 +195,8 @@ def measuring_point(shape: Outline, below_tip_px: float, side: int) -> tuple[flo
     DataError
         If the finger does not extend to the measuring height.
     """
-    tip = _tip(shape, Direction.UP).along_px
-    crossings = _crossings(shape, Direction.UP, tip + below_tip_px)
+    tip = _tip(shape, AXES[Direction.UP]).along_px
+    crossings = _crossings(shape, AXES[Direction.UP], tip + below_tip_px)
     if not crossings:
-        msg = f"below_tip_px must lie between 0 and the finger's length, but is {below_tip_px:g}."
-        raise DataError(msg)
+        raise DataError(f"below_tip_px must lie between 0 and the finger's length, but is {below_tip_px:g}.")
     return (max(crossings) if side < 0 else min(crossings)), tip

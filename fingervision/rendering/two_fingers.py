@@ -6,7 +6,7 @@ import numpy as np
 
 from fingervision.domain.direction import Direction
 from fingervision.domain.errors import DataError
-from fingervision.rendering.finger import Finger, Highlight, SquareTip, Tip, axis_motion, finger_shape, highlight_shape
+from fingervision.rendering.finger import AXES, Finger, Highlight, SquareTip, Tip, finger_shape, highlight_shape
 from fingervision.rendering.outline import Motion
 from fingervision.rendering.scene import EVEN_LIGHT, Light, Patch, Rim, Scene
 from fingervision.rendering.truth import measuring_point
@@ -82,9 +82,10 @@ def two_fingers(
     """
     numbers = (gap_px, below_tip_px, width_px, radius_px, tip_step_px, centre_px, *np.atleast_1d(tilt_deg))
     if not np.isfinite(numbers).all():
-        msg = f"Every size and tilt of two fingers must be a finite number, but they are {[float(x) for x in numbers]}."
-        raise DataError(msg)
-    axes = axis_motion(direction)
+        raise DataError(
+            f"Every size and tilt of two fingers must be a finite number, but they are {[float(x) for x in numbers]}."
+        )
+    axes = AXES[direction]
     across_size, along_size = frame if direction.is_vertical else frame[::-1]
     shape = tip if tip is not None else SquareTip(radius_px)
     mirrored = SquareTip(shape.radius_px, -shape.slant_deg) if isinstance(shape, SquareTip) else shape
@@ -99,8 +100,9 @@ def two_fingers(
     tips_along = (root_side, root_side - tip_step_px)
 
     if not abs(gap_px) >= abs(tip_step_px):
-        msg = f"gap_px must be at least the step between the tips ({abs(tip_step_px):g} px), but is {gap_px:g}."
-        raise DataError(msg)
+        raise DataError(
+            f"gap_px must be at least the step between the tips ({abs(tip_step_px):g} px), but is {gap_px:g}."
+        )
     component = sqrt(gap_px**2 - tip_step_px**2) * (1.0 if gap_px >= 0.0 else -1.0)
     middle = (across_size - 1) / 2 + centre_px
     fingers = []
