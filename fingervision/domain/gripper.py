@@ -170,7 +170,8 @@ class Gripper:
     hinge: Hinge
     lever: Lever
     links: Links
-    uncertainties: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    # A mapping has no hash; what is computed from a drawing is found again by its numbers.
+    uncertainties: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
 
     @property
     def tip_corner_mm(self) -> PointMm:

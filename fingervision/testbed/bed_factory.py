@@ -3,17 +3,19 @@
 import re
 from collections.abc import Collection
 from contextlib import suppress
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, cast
 
 from calib.calibration import BareScale
 from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import Model
 from fingervision.measuring.scale import Scale
 from fingervision.models.answer_figures import Physics
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.kinds import build_model, kinds
+from fingervision.models.kinds import REGISTRY, GripperModel, build_model, kinds
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.drive_csv import SAMPLE_COLUMNS
 from fingervision.storage.gripper_toml import read_gripper
@@ -238,4 +240,15 @@ def gripper_model(section: Section, folder: Path) -> Model:
     else:
         gripper = sample_gripper()
     physics = Physics(large_rotation=section.flag("large_rotation"), contact=section.flag("contact"))
-    return build_model(section.word("kind", "lumped", of=kinds()), gripper, physics, HingeTheory.CORRECTED)
+    kind = section.word("kind", "lumped", of=kinds())
+    if physics.large_rotation:
+        # Its equilibria are followed from those that were found before, so that runs of one process would differ.
+        return build_model(kind, gripper, physics, HingeTheory.CORRECTED)
+    return _kept_model(kind, gripper, physics, REGISTRY.version)
+
+
+@lru_cache(maxsize=8)
+def _kept_model(kind: str, gripper: Gripper, physics: Physics, version: int) -> GripperModel:
+    """Build a model once in a process for each drawing: it takes most of the time of opening a simulated bed."""
+    del version
+    return build_model(kind, gripper, physics, HingeTheory.CORRECTED)

@@ -3,12 +3,14 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.drive_csv import read_samples
+from fingervision.testbed.planned_bed import planned_bed
 from tests.testbed.board_bed import CONTRACT_STEPS, written_bed
 
 HEAD = 'schema = 1\nname = "test"\nbelow_force_n = 2.9\n'
@@ -96,3 +98,17 @@ def test_a_bed_without_a_file_is_one_sentence(tmp_path: Path) -> None:
     done = check(tmp_path, TRIANGLE.format(to_mm=1.0, speed=0.5), "--bed", str(tmp_path / "no.toml"))
     assert done.exit_code == 1
     assert "no.toml" in str(done.exception)
+
+
+def test_a_simulated_bed_that_is_opened_again_has_the_model_that_was_built(tmp_path: Path) -> None:
+    first, second = (planned_bed("simulated"), planned_bed("simulated"))
+    assert first.model is second.model
+    thicker = tmp_path / "gripper.toml"
+    text = (Path(__file__).parents[2] / "sample_frames" / "paper" / "gripper.toml").read_text(encoding="utf-8")
+    thicker.write_text(text.replace("thickness_mm = 1.0", "thickness_mm = 1.1"), encoding="utf-8")
+    bed = '[actuator]\nkind = "simulated"\n[camera]\nkind = "simulated"\n[gripper]\nfile = "gripper.toml"\n'
+    (tmp_path / "bed.toml").write_text(f"schema = 1\n{bed}[scale]\npx_per_mm = 34.0\n", encoding="utf-8")
+    other = planned_bed(str(tmp_path / "bed.toml"))
+    assert other.model is not None
+    assert first.model is not None
+    assert other.model.respond(np.ones(1)).force_n > first.model.respond(np.ones(1)).force_n
