@@ -22,14 +22,11 @@ from fingervision.domain.gripper import Gripper
 from fingervision.interface.argument_checks import one_of, path_of, speaks_python
 from fingervision.models.answer_figures import LINEAR, ModelFigures, Physics
 from fingervision.models.elastic_mechanism import MechanismState
-from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_figures import gripper_figures, unit_of
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model, disagreements, kinds, small_displacements_alone
-from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
-from fingervision.models.rigid_bodies import RigidBodies
+from fingervision.models.mechanism_figures import MECHANISM_MODELS, MechanismModel, mechanism_figures
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import MechanismDrawing, is_mechanism, read_drawing
 from fingervision.storage.out_folder import own_folder
@@ -355,7 +352,7 @@ def predict_mechanism(
     for name in _MECHANISM_KINDS if kind == ALL else (kind,):
         try:
             with naming(path):
-                built = _built(name, mechanism)
+                built = MECHANISM_MODELS[name](mechanism)
                 figures[name] = mechanism_figures(built)
         except FingervisionError as error:
             refusals[name] = error
@@ -413,14 +410,6 @@ def naming(path: Path) -> Iterator[None]:
         if str(path) in str(error) or isinstance(error, ArgumentError | InstallationError):
             raise
         raise type(error)(f"In {path}: {error}") from error
-
-
-def _built(name: str, mechanism: Mechanism) -> MechanismModel:
-    if name == "finite_element":
-        return MechanismPlate(mechanism)
-    if name == "lumped":
-        return MechanismFrame(mechanism)
-    return RigidBodies(mechanism)
 
 
 def _mechanism_inputs(driven: Array | None, at_yield_mm: float, touching: Iterable[float], *, is_curved: bool) -> Array:

@@ -29,6 +29,16 @@ def turned_axes(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
+def frame_axes(c: float, s: float) -> Array:
+    """Turn motions (x, y, rotation) from axes in the direction (c, s) to global axes; shape (3, 3)."""
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def carried(arm: Array) -> Array:
+    """Matrix that gives the motion at the end of an arm from that at its start; its transpose transfers loads back."""
+    return np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CorotationalBody:
     """One condensed body in large rotation.

@@ -1,7 +1,4 @@
-"""Damping of the gripper's vibrations: four damping laws.
-
-The damping laws are a constant modal damping ratio, a loss factor, Rayleigh damping, and equation (4) of Hricko &
-Havlik (2015).
+"""Damping of the gripper's vibrations: a constant ratio, Rayleigh damping, equation (4) of Hricko & Havlik (2015).
 
 PA12 at room temperature has a loss factor tan d = 0.03 to 0.08, so that its damping ratio tan d / 2 is about 0.025;
 static results do not depend on damping.
@@ -23,24 +20,13 @@ _SINH_UNDERFLOWS_ABOVE = 30.0
 
 @dataclass(frozen=True, slots=True)
 class ModalDamping:
-    """Damping law with the same damping ratio in every mode."""
+    """Damping law with the same damping ratio in every mode: at resonance, half the loss factor of the material."""
 
     ratio: float = 0.025
 
     def ratios(self, rad_s: Array) -> Array:
         """Damping ratio of each mode."""
         return checked(np.full_like(rad_s, self.ratio))
-
-
-@dataclass(frozen=True, slots=True)
-class LossFactor:
-    """Structural damping: at resonance, the damping ratio is half the loss factor."""
-
-    eta: float = 0.05
-
-    def ratios(self, rad_s: Array) -> Array:
-        """Damping ratio of each mode."""
-        return checked(np.full_like(rad_s, 0.5 * self.eta))
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,13 +125,12 @@ def checked(ratios: Array) -> Array:
     return ratios
 
 
-Damping = ModalDamping | LossFactor | RayleighDamping | PaperDamping
+Damping = ModalDamping | RayleighDamping | PaperDamping
 
 
 # Parse the short text of a damping law that is given to `model --damping`.
 
 FORMS = "modal:0.025, loss:0.05, rayleigh:0.025:45:360 (ratio and two frequencies in Hz) or paper[:0.5]"
-_LIMIT = 0.3
 
 
 def parse_damping(text: str) -> Damping:
@@ -173,14 +158,12 @@ def parse_damping(text: str) -> Damping:
     if law == "paper":
         return PaperDamping(None, *numbers)
     ratio = 0.5 * numbers[0] if law == "loss" else numbers[0]
-    if ratio >= _LIMIT:
+    if ratio >= _MOST:
         raise UsageError(
-            f"--damping must give a damping ratio below {_LIMIT:g}, which no solid exceeds, but {text} gives {ratio:g}."
+            f"--damping must give a damping ratio below {_MOST:g}, which no solid exceeds, but {text} gives {ratio:g}."
         )
-    if law == "modal":
+    if law != "rayleigh":
         return ModalDamping(ratio)
-    if law == "loss":
-        return LossFactor(numbers[0])
     if not numbers[1] < numbers[2]:
         raise UsageError(f"--damping rayleigh must have two frequencies in Hz, the lower one first, but is {text}.")
     return RayleighDamping(ratio, 2.0 * pi * numbers[1], 2.0 * pi * numbers[2])

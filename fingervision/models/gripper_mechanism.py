@@ -226,7 +226,7 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
     x0, x1, y0, _ = links.pillar_and_root_mm
     foot = (0.5 * (x0 + x1), y0 + apart) if number == 1 else (apart, gripper.lever.drive_mm[1])
     tip = (gripper.tip_corner_mm[0] + apart, gripper.measuring_point_mm[1])
-    parted = any(piece.holds(foot) and not piece.holds(tip) for piece in pieces)
+    parted = any(piece.holds(np.array([foot, tip]).T).tolist() == [True, False] for piece in pieces)
     if len(pieces) != 2 or not parted:
         end = "clamp" if number == 1 else "drive"
         raise DataError(

@@ -7,6 +7,7 @@ from math import hypot, pi, sqrt
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Material, PointMm
@@ -40,6 +41,12 @@ class Face:
     name: str
     box_mm: tuple[float, float, float, float]
     is_pin: bool = False
+
+    def holds(self, points_mm: NDArray[np.float64], near_mm: float) -> NDArray[np.bool_]:
+        """Whether points, shape (2, n), lie in the box, or at most a distance outside it."""
+        (x0, x1, y0, y1), (x, y) = self.box_mm, points_mm
+        inside = (x >= x0 - near_mm) & (x <= x1 + near_mm) & (y >= y0 - near_mm) & (y <= y1 + near_mm)
+        return np.asarray(inside)
 
     @property
     def middle_mm(self) -> PointMm:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.models.flexure_span import span_of
-from fingervision.models.mechanism import Face, Mechanism
+from fingervision.models.mechanism import Mechanism
 from fingervision.models.planar_region import Loop, PlanarRegion
-from fingervision.models.plane_shapes import Polygon, Shape
+from fingervision.models.plane_shapes import Shape
 from fingervision.models.plane_stress import PlaneStressPlate
 
 # Pose of a body: the rigid motion that fits the motions of many of its points best.
@@ -114,9 +114,9 @@ class LinkBody:
 
     def holds(self, points_mm: Array) -> Flags:
         """Whether points, shape (2, n), lie in the body; arcs are replaced by their chords."""
-        inside = _polygon(self.outline).holds(points_mm)
+        inside = self.outline.holds(points_mm)
         for hole in self.holes:
-            inside = inside & ~_polygon(hole).holds(points_mm)
+            inside = inside & ~hole.holds(points_mm)
         return inside
 
 
@@ -137,12 +137,13 @@ def _divided(mechanism: Mechanism, region: PlanarRegion) -> tuple[LinkBody, ...]
     outer = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
     inner = [loop for loop in cut.loops if loop.area_mm2 < 0.0]
     # A hole belongs to the smallest outline that contains the hole; loops are sorted by size.
-    owners = [max(n for n, loop in enumerate(outer) if loop.holds(_point(hole))) for hole in inner]
+    points = [hole.sides_mm[0][:, [_CHORDS // 2]] for hole in inner]
+    owners = [max(n for n, loop in enumerate(outer) if loop.holds(point)[0]) for point in points]
     names = _names(mechanism, outer)
     found = []
     for number, loop in enumerate(outer):
         holes = tuple(hole for hole, owner in zip(inner, owners, strict=True) if owner == number)
-        held = any(_touches(loop, face, _ON * region.size_mm) for face in mechanism.fixed)
+        held = any(face.holds(side, _ON * region.size_mm).any() for face in mechanism.fixed for side in loop.sides_mm)
         found.append(LinkBody(names[number], held, loop, holes, _centroid_mm((loop, *holes))))
     return tuple(found)
 
@@ -203,11 +204,10 @@ def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
     """
     names: dict[int, str] = {}
     halved: dict[int, str] = {}
-    polygons = [_polygon(loop) for loop in pieces]
     for (added, shape), name in zip(mechanism.bodies, mechanism.body_names, strict=False):
         if added and name:
             points = _points_in(shape)
-            share = [int(polygon.holds(points).sum()) for polygon in polygons]
+            share = [int(loop.holds(points).sum()) for loop in pieces]
             mostly = 2 * max(share) > points.shape[1]
             (names if mostly else halved).setdefault(int(np.argmax(share)), column_name(name))
     names = halved | names
@@ -227,35 +227,12 @@ def _points_in(shape: Shape) -> Array:
     return np.asarray(grid[:, shape.holds(grid)])
 
 
-def _corners(loop: Loop) -> Array:
-    """Corners of a loop with arcs replaced by chords, shape (2, n)."""
-    return np.concatenate(
-        [c.at(np.linspace(c.t0, c.t1, 2 if c.is_straight else _CHORDS))[:, :-1] for c in loop.curves], axis=1
-    )
-
-
-def _polygon(loop: Loop) -> Polygon:
-    return Polygon(tuple((float(x), float(y)) for x, y in _corners(loop).T))
-
-
-def _point(loop: Loop) -> tuple[float, float]:
-    x, y = loop.curves[0].at(np.array([0.5 * (loop.curves[0].t0 + loop.curves[0].t1)]))[:, 0]
-    return float(x), float(y)
-
-
 def _centroid_mm(loops: Sequence[Loop]) -> Array:
     """Centroid of an area by Green's formula; holes run in the opposite direction and are subtracted."""
     area, moment = 0.0, np.zeros(2)
     for loop in loops:
-        a = _corners(loop)
-        b = np.roll(a, -1, axis=1)
+        a, b = loop.corners_mm, np.roll(loop.corners_mm, -1, axis=1)
         cross = a[0] * b[1] - a[1] * b[0]
         area += 0.5 * float(cross.sum())
         moment += (a + b) @ cross / 6.0
     return np.asarray(moment / area)
-
-
-def _touches(loop: Loop, face: Face, near_mm: float) -> bool:
-    x0, x1, y0, y1 = face.box_mm
-    x, y = np.concatenate([c.at(np.linspace(c.t0, c.t1, _CHORDS)) for c in loop.curves], axis=1)
-    return bool(np.any((x >= x0 - near_mm) & (x <= x1 + near_mm) & (y >= y0 - near_mm) & (y <= y1 + near_mm)))

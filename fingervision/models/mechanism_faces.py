@@ -37,13 +37,10 @@ def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm:
     """
     if face.is_pin:
         return _within_pin(plate, face)[0]
-    x, y = plate.nodes_mm
-    x0, x1, y0, y1 = face.box_mm
-    near = _ON * size_mm
     outline = np.unique(plate.outline_edges)
-    inside = (x >= x0 - near) & (x <= x1 + near) & (y >= y0 - near) & (y <= y1 + near)
-    nodes = outline[inside[outline]]
+    nodes = outline[face.holds(plate.nodes_mm[:, outline], _ON * size_mm)]
     if nodes.size < 2:
+        x0, x1, y0, y1 = face.box_mm
         raise DataError(
             f"face {face.name} of {mechanism.name} must hold a part of the outline, but its box "
             f"[{x0:g}, {x1:g}, {y0:g}, {y1:g}] mm holds none."

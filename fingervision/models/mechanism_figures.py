@@ -10,6 +10,7 @@ from fingervision.domain.errors import ModelError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import Part
 from fingervision.models.lumped import MechanismFrame
+from fingervision.models.mechanism import Mechanism
 from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, out_of_plane
 from fingervision.models.rigid_bodies import RigidBodies
 
@@ -173,6 +174,15 @@ class GrippedPair:
 
 
 MechanismModel = MechanismPlate | MechanismFrame | RigidBodies
+MECHANISM_MODELS: dict[str, type[MechanismModel]] = {
+    model.kind: model for model in (MechanismPlate, MechanismFrame, RigidBodies)
+}
+"""Kinds of model of a drawing by bodies, the most trusted first."""
+
+
+def quickest_model(mechanism: Mechanism) -> MechanismFrame | MechanismPlate:
+    """Build the model that takes the least time for many drawings: lumped, if there are flexures."""
+    return MechanismFrame(mechanism) if mechanism.flexures else MechanismPlate(mechanism)
 
 
 def response_figures(model: MechanismModel) -> dict[str, float]:

@@ -188,7 +188,7 @@ def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None
         The reduced mechanism.
     drive : DriveHistory
         Inputs over time.
-    damping : ModalDamping, LossFactor, RayleighDamping or PaperDamping
+    damping : ModalDamping, RayleighDamping or PaperDamping
         Damping law; None is a modal damping ratio of 0.025.
     """
     model, ratios = model.damped(damping or ModalDamping())
@@ -295,7 +295,7 @@ def frequency_response(
         The mechanism with its drive free.
     frequency_hz : ndarray of float, shape (n,)
         Frequencies of the drive.
-    damping : ModalDamping, LossFactor, RayleighDamping or PaperDamping
+    damping : ModalDamping, RayleighDamping or PaperDamping
         Damping law; None is a modal damping ratio of 0.025.
     """
     law = damping or ModalDamping()

@@ -211,7 +211,7 @@ def gripper_motion(
         Model of the gripper, with its physics.
     drive : DriveHistory
         Inputs over time, linear between samples.
-    damping : ModalDamping, LossFactor, RayleighDamping or PaperDamping
+    damping : ModalDamping, RayleighDamping or PaperDamping
         Damping law; None is a modal damping ratio of 0.025.
     modes : int
         Number of modes with the drive held.

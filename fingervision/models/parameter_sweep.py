@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError, ModelError, UsageError
 from fingervision.domain.gripper import Gripper
-from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_mechanism import check_outline, redrawn
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.lumped import LumpedGripper, MechanismFrame
+from fingervision.models.lumped import LumpedGripper
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_figures import mechanism_figures
+from fingervision.models.mechanism_figures import mechanism_figures, quickest_model
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.models.uncertainty import ratios, scaled
 
@@ -166,20 +165,16 @@ def mechanism_sweep_answers(
     grid = list(product(*(variation.values for variation in variations)))
     if len(grid) > _MOST_MECHANISMS:
         raise UsageError(f"--vary must give at most {_MOST_MECHANISMS} mechanisms, but gives {len(grid)}.")
-    rows: list[dict[str, float]] = []
     # Check the corners of the grid first, so that an invalid corner is reported before anything is computed.
     corners = list(product(*((v.values[0], v.values[-1]) for v in variations)))
-    for values in [*corners, *grid]:
+    found = []
+    for place, values in enumerate([*corners, *grid]):
         try:
             mechanism = redrawn_to({v.name: value for v, value in zip(variations, values, strict=True)})
-            if len(rows) >= len(corners):
-                model = MechanismFrame(mechanism) if mechanism.flexures else MechanismPlate(mechanism)
-                rows.append(mechanism_figures(model))
-            else:
-                rows.append({})
+            if place >= len(corners):
+                found.append(mechanism_figures(quickest_model(mechanism)))
         except FingervisionError as error:
             raise ModelError(f"The variant {_spelt(variations, values)} could not be computed: {error}") from error
-    found = rows[len(corners) :]
     columns = tuple(dict.fromkeys(name for row in found for name in row if not name.startswith("model_error")))
     return np.array(grid), columns, np.array([[row.get(name, np.inf) for name in columns] for row in found])
 

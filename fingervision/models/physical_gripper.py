@@ -20,7 +20,6 @@ from fingervision.domain.model import Model, PhysicalLaw
 from fingervision.domain.parameter import Estimate
 from fingervision.domain.response import Response
 from fingervision.models.answer_figures import LINEAR
-from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_mechanism import redrawn, whole_mechanism
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
@@ -28,9 +27,8 @@ from fingervision.models.kinds import build_model
 from fingervision.models.laws import laws_of
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_figures import MechanismModel
+from fingervision.models.mechanism_figures import MECHANISM_MODELS
 from fingervision.models.place_answers import PlaceAnswers
-from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.models.small_answer import DrawnAnswer, SmallAnswer, ratio_curves, small_answer
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
@@ -182,15 +180,9 @@ class MechanismModelOfGap:
                 f"{mechanism.name} must have a pair of probes called {GAP} to be compared with a measured gap, but has "
                 f'{", ".join(mechanism.pairs) or "none"}: add [[pair]] name = "{GAP}" with of = [two probes].'
             )
-        model: MechanismModel
-        if kind == "finite_element":
-            model = MechanismPlate(mechanism)
-        elif kind == "stiffness_matrix":
-            model = RigidBodies(mechanism)
-        elif kind == "lumped":
-            model = MechanismFrame(mechanism)
-        else:
-            raise UsageError(f"The kind of model must be finite_element, lumped or stiffness_matrix, but is {kind}.")
+        if kind not in MECHANISM_MODELS:
+            raise UsageError(f"The kind of model must be {', '.join(MECHANISM_MODELS)}, but is {kind}.")
+        model = MECHANISM_MODELS[kind](mechanism)
         self._model = model
         state = model.state(1.0)
         # Without a stress, the range is a hundredth of the size, as for a gripper whose fingers never touch.

@@ -19,7 +19,7 @@ from fingervision.domain.gripper import PointMm
 from fingervision.models.corotational_frame import CorotationalFrame
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_bodies import LinkBody, body_weights
+from fingervision.models.mechanism_bodies import MRAD, LinkBody, body_weights
 
 Array = NDArray[np.float64]
 
@@ -104,47 +104,40 @@ class PlaceAnswers:
 
     def _make_observers(self) -> None:
         """Express the outputs as linear functionals of the frames' motions; hinge angles from body rotations."""
-        model, plate = self.model, self.model.plate
-        self._weights = body_weights(plate, model.bodies)
-        size = model.frame.unknowns
+        assembly, plate = self.model.assembly, self.model.plate
+        self._weights = body_weights(plate, self.model.bodies)
         self._probe_of: dict[str, tuple[int, Array]] = {}
-        rows = len(self._weights) * 3
-        self._poses = np.zeros((rows, size))
-        assembly = model.assembly
-        for number, body in enumerate(assembly.bodies):
-            nodes = np.flatnonzero(assembly.piece == number)
+        self._poses = np.zeros((3 * len(self._weights), self.model.frame.unknowns))
+        for number in range(len(assembly.bodies)):
+            here = assembly.piece == number
             for place, (weights, centroid) in enumerate(self._weights.values()):
-                if weights[nodes].sum() > 0.5 * weights.sum():
-                    share = weights[nodes] / weights[nodes].sum()
-                    at = plate.nodes_mm[:, nodes]
-                    middle = at @ share
-                    arm = at - middle[:, None]
-                    x, y = body.shapes_mm[plate.x_dofs[nodes]], body.shapes_mm[plate.y_dofs[nodes]]
-                    mean = np.stack([share @ x, share @ y])
-                    angle = (share * arm[0]) @ y - (share * arm[1]) @ x
-                    angle /= float(share @ np.sum(arm**2, axis=0))
-                    reach = centroid - middle
-                    own = np.stack([mean[0] - angle * reach[1], mean[1] + angle * reach[0], 1e3 * angle])
-                    self._poses[3 * place : 3 * place + 3, body.unknowns] = own
+                if weights[here].sum() > 0.5 * weights.sum():
+                    own = self._pose_of(number, weights, centroid)
+                    self._poses[3 * place : 3 * place + 3] = own * np.array([[1.0], [1.0], [MRAD]])
         for name, point in self.mechanism.probes.items():
             number = int(assembly.piece[np.argmin(np.hypot(*(plate.nodes_mm - np.array(point)[:, None])))])
-            own = np.zeros((3, size))
-            body = assembly.bodies[number]
+            body, own = assembly.bodies[number], np.zeros((3, self.model.frame.unknowns))
             own[:2, body.unknowns] = plate.rows_at(point) @ body.shapes_mm
             # The rotation of the body moves a probe that is displaced from its drawn position.
             own[2] = self._turn_of(number)
             self._probe_of[name] = number, own
 
+    def _pose_of(self, body: int, weights: Array, about_mm: Array) -> Array:
+        """Mean motion of a body (x, y, rotation in rad) at a point, as functionals of the frames' motions."""
+        assembly, plate = self.model.assembly, self.model.plate
+        nodes, own = np.flatnonzero(assembly.piece == body), assembly.bodies[body]
+        share = weights[nodes] / weights[nodes].sum()
+        middle = plate.nodes_mm[:, nodes] @ share
+        arm, reach = plate.nodes_mm[:, nodes] - middle[:, None], about_mm - middle
+        x, y = own.shapes_mm[plate.x_dofs[nodes]], own.shapes_mm[plate.y_dofs[nodes]]
+        angle = ((share * arm[0]) @ y - (share * arm[1]) @ x) / float(share @ np.sum(arm**2, axis=0))
+        rows = np.zeros((3, self.model.frame.unknowns))
+        rows[:, own.unknowns] = np.stack([share @ x - angle * reach[1], share @ y + angle * reach[0], angle])
+        return rows
+
     def _turn_of(self, body: int) -> Array:
         """Mean rotation of a body (rad), as a functional of the coordinate frames' motions."""
-        assembly, plate = self.model.assembly, self.model.plate
-        nodes = np.flatnonzero(assembly.piece == body)
-        arm = plate.nodes_mm[:, nodes] - plate.nodes_mm[:, nodes].mean(axis=1)[:, None]
-        shapes = assembly.bodies[body].shapes_mm
-        row = np.zeros(self.model.frame.unknowns)
-        turn = arm[0] @ shapes[plate.y_dofs[nodes]] - arm[1] @ shapes[plate.x_dofs[nodes]]
-        row[assembly.bodies[body].unknowns] = turn / float(np.sum(arm**2))
-        return row
+        return np.asarray(self._pose_of(body, np.ones(self.model.plate.x_dofs.size), np.zeros(2))[2])
 
     @property
     def moving_bodies(self) -> tuple[str, ...]:
@@ -186,7 +179,7 @@ class PlaceAnswers:
             columns = np.stack([normal[0], normal[1], arm[0] * normal[1] - arm[1] * normal[0]], axis=1)
             bent = body.shapes_mm @ moved[body.unknowns]
             along = normal[0] * bent[plate.x_dofs[at]] + normal[1] * bent[plate.y_dofs[at]]
-            found = np.linalg.lstsq(columns * root[:, None], along * root, rcond=None)[0] * (1.0, 1.0, 1e3)
+            found = np.linalg.lstsq(columns * root[:, None], along * root, rcond=None)[0] * (1.0, 1.0, MRAD)
             place = 3 * list(self._weights).index(link.name)
             change = found - self._poses[place : place + 3] @ moved
             own_of |= {f"{link.name}.{part}": float(v) for part, v in zip(PARTS, change, strict=True)}
@@ -290,7 +283,7 @@ class PlaceAnswers:
         rows = [*(self._poses @ arms)]
         for number in range(len(self.mechanism.flexures)):
             first, last = self.ends(number)
-            rows.append(1e3 * (self._turn_of(last) - self._turn_of(first)) @ arms)
+            rows.append(MRAD * (self._turn_of(last) - self._turn_of(first)) @ arms)
         probes: dict[str, Array] = {}
         for name, (_, own) in self._probe_of.items():
             x, y = changes.probes_mm.get(name, (0.0, 0.0))

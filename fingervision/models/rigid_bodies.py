@@ -17,6 +17,7 @@ from scipy.sparse import csr_matrix
 
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import PointMm
+from fingervision.models.corotational_frame import carried, frame_axes
 from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStress, MechanismState
 from fingervision.models.flexure_span import FlexureSpan, span_of
 from fingervision.models.flexure_stress import nominal_stress
@@ -29,7 +30,6 @@ from fingervision.models.mechanism_faces import driven_components, per_input_of,
 
 Array = NDArray[np.float64]
 
-_SAMPLES = 65
 _ON = 1e-6
 _BESIDE = 0.05
 _LOOSE = 1e-12
@@ -58,7 +58,7 @@ class RigidBodies(ElasticMechanism):
         super().__init__(mechanism)
         self.theory, region = theory, mechanism.region
         check_mechanism(mechanism, region)
-        self._size_mm = region.size_mm
+        self._size_mm, self._near_mm = region.size_mm, _ON * region.size_mm
         spans = [span_of(flexure, region) for flexure in mechanism.flexures]
         self._joins = [self._joined(span) for span in spans]
         # Bodies are rigid, so that a leaf bends over its whole free length.
@@ -72,7 +72,7 @@ class RigidBodies(ElasticMechanism):
 
     def _body_of(self, point: Array, what: str) -> int:
         for number, body in enumerate(self.bodies):
-            if body.outline.holds((float(point[0]), float(point[1]))):
+            if body.outline.holds(point[:, None])[0]:
                 return number
         raise ModelError(f"{what} of {self.mechanism.name} must lie on a body, but does not.")
 
@@ -82,33 +82,22 @@ class RigidBodies(ElasticMechanism):
         first, last = (self._body_of(np.array(flexure.point_mm(x, 0.0)), f"flexure {flexure.name}") for x in ends)
         return first, last
 
-    def _on(self, face: Face, curve_mm: Array) -> NDArray[np.bool_]:
-        """Which points of an outline lie in a face's box."""
-        x0, x1, y0, y1 = face.box_mm
-        (x, y), near = curve_mm, _ON * self._size_mm
-        return np.asarray((x >= x0 - near) & (x <= x1 + near) & (y >= y0 - near) & (y <= y1 + near))
-
-    @cached_property
-    def _outlines(self) -> list[tuple[int, Array]]:
-        """Points of every side of every body, with the number of the body."""
-        return [
-            (number, curve.at(np.linspace(curve.t0, curve.t1, _SAMPLES)))
-            for number, body in enumerate(self.bodies)
-            for curve in body.outline.curves
-        ]
-
     def _touching(self, face: Face) -> set[int]:
         if face.is_pin:
             return {self._body_of(np.array(face.middle_mm), f"pin {face.name}")}
-        return {number for number, points in self._outlines if self._on(face, points).any()}
+        return {
+            number
+            for number, body in enumerate(self.bodies)
+            if any(face.holds(side, self._near_mm).any() for side in body.outline.sides_mm)
+        }
 
     def _middle_mm(self, face: Face) -> Array:
         """Middle of the part of the outline in a face's box, at which its force acts."""
         if face.is_pin:
             return np.array(face.middle_mm)
         moment, length = np.zeros(2), 0.0
-        for _, points in self._outlines:
-            inside = self._on(face, points)
+        for points in (side for body in self.bodies for side in body.outline.sides_mm):
+            inside = face.holds(points, self._near_mm)
             steps = np.hypot(*np.diff(points, axis=1)) * (inside[1:] & inside[:-1])
             moment += 0.5 * (points[:, 1:] + points[:, :-1]) @ steps
             length += float(steps.sum())
@@ -125,14 +114,14 @@ class RigidBodies(ElasticMechanism):
     def _rows(self, body: int, at: Array) -> Array:
         """Motion (x, y, rotation) of a point of a body by the motions of all bodies at the origin."""
         rows = np.zeros((3, 3 * len(self.bodies)))
-        rows[:, 3 * body : 3 * body + 3] = _carried(at)
+        rows[:, 3 * body : 3 * body + 3] = carried(at)
         return rows
 
     def _held_by(self, face: Face, components: tuple[str, ...]) -> list[int]:
         """Motions (0 x, 1 y, 2 rotation) of a body that a face fixes; rotation only if the face is wide enough."""
         x0, x1, y0, y1 = face.box_mm
         wide = {"x": y1 - y0, "y": x1 - x0}
-        turns = [2] if any(wide[component] > _ON * self._size_mm for component in components) else []
+        turns = [2] if any(wide[component] > self._near_mm for component in components) else []
         return ["xy".index(component) for component in components] + turns
 
     @cached_property
@@ -182,11 +171,11 @@ class RigidBodies(ElasticMechanism):
             stations = span.stations_mm(mechanism.plate_mm)
             parts = span.compliances(mechanism.plate_mm, mechanism.material, self.theory, width_effect=True)
             angle = np.radians(span.flexure.axis_deg)
-            axes = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0, 0, 1.0]])
+            axes = frame_axes(np.cos(angle), np.sin(angle))
             end = np.array(span.flexure.point_mm(float(stations[-1]), 0.0))
             total = np.zeros((3, 3))
             for x, part in zip(stations[1:].tolist(), parts, strict=True):
-                moved = _carried(end - np.array(span.flexure.point_mm(x, 0.0))) @ axes
+                moved = carried(end - np.array(span.flexure.point_mm(x, 0.0))) @ axes
                 total += moved @ part @ moved.T
             found.append(
                 (
@@ -285,12 +274,7 @@ class RigidBodies(ElasticMechanism):
         """Return a point slightly inside the body, next to a point on its outline."""
         for angle in np.linspace(0.0, 2.0 * np.pi, 9)[:-1]:
             way = 1e-5 * self._size_mm * np.array([np.cos(angle), np.sin(angle)])
-            x, y = np.array(point) + way
-            if any(body.outline.holds((float(x), float(y))) for body in self.bodies):
+            beside = (np.array(point) + way)[:, None]
+            if any(body.outline.holds(beside)[0] for body in self.bodies):
                 return way
         return np.zeros(2)
-
-
-def _carried(arm: Array) -> Array:
-    """Matrix that gives the motion at the end of an arm from that at its start; its transpose transfers loads back."""
-    return np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError
 from fingervision.domain.gripper import Gripper, Material, PointMm
 from fingervision.models.condensed_bodies import condensed, face_frame, section_frame
+from fingervision.models.corotational_frame import carried, frame_axes
 from fingervision.models.gripper_mechanism import right_of_axis
 from fingervision.models.hinge_correction import (
     HingeTheory,
@@ -153,10 +154,8 @@ def unit_compliance(shape: BlockShape) -> Array:
     # themselves.
     moving = np.array([0, 4, 6, 7, 8])
     whole = np.linalg.inv(K[np.ix_(moving, moving)])[2:, 2:]
-    c, s = along
-    axes = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    axes, back = frame_axes(*along), carried(-_STUB * along)
     own = axes @ bar_compliance(_STUB, 1.0, 1.0, material) @ axes.T
-    back = np.array([[1.0, 0.0, _STUB * s], [0.0, 1.0, -_STUB * c], [0.0, 0.0, 1.0]])
     root = back @ (whole - own) @ back.T
     values, vectors = np.linalg.eigh(0.5 * (root + root.T))
     return np.asarray(vectors @ np.diag(np.maximum(values, _LEAST * values.max())) @ vectors.T)
@@ -341,10 +340,8 @@ def skeleton_of(gripper: Gripper, theory: HingeTheory) -> Skeleton:
 def _yielding(member: Member, at_start: Array) -> Member:
     """Add an elastic joint, with a given compliance (x, y, rotation) in global axes, at the start of a rigid member."""
     way = np.subtract(member.end_mm, member.start_mm)
-    c, s = way / np.hypot(*way)
-    carried = np.array([[1.0, 0.0, -way[1]], [0.0, 1.0, way[0]], [0.0, 0.0, 1.0]])
-    axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    return replace(member, compliance=axes @ carried @ at_start @ carried.T @ axes.T)
+    axes, moved = frame_axes(*(way / np.hypot(*way))), carried(way)
+    return replace(member, compliance=axes.T @ moved @ at_start @ moved.T @ axes)
 
 
 def _hinge_ends(centre: PointMm, axis_deg: float, reach: float) -> tuple[PointMm, PointMm]:

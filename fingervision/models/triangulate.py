@@ -60,12 +60,12 @@ def inner_triangles(region: PlanarRegion, points: Array) -> Indices:
     return np.asarray(triangles[:, np.abs(twice) > 1e-12 * np.sum((b - a) ** 2 + (c - a) ** 2, axis=0)])
 
 
-def edges_of(triangles: Indices) -> Indices:
-    """Every edge of the triangles, listed once; shape (2, k)."""
+def edges_of(triangles: Indices) -> tuple[Indices, Indices, Indices]:
+    """Edges of the triangles, listed once, shape (2, k); the edge of every side, shape (3 m,); and sides per edge."""
     pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
-    # Pairs coded as single numbers are sorted ten times as fast.
     count = int(triangles.max()) + 1
-    return np.asarray(np.stack(np.divmod(np.unique(pairs[0] * count + pairs[1]), count)))
+    numbers, place, times = np.unique(pairs[0] * count + pairs[1], return_inverse=True, return_counts=True)
+    return np.stack(np.divmod(numbers, count)), place, times
 
 
 def triangle_quality(points: Array, triangles: Indices) -> Array:
@@ -141,10 +141,8 @@ def halved(sides: list[OutlineSide], missing: set[int]) -> list[OutlineSide]:
 
 def missing_sides(sides: list[OutlineSide], triangles: Indices) -> set[int]:
     """Indices of outline edges that belong to no triangle, or that have triangles on both sides."""
-    pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
-    count = int(triangles.max()) + 1
-    numbers, times = np.unique(pairs[0] * count + pairs[1], return_counts=True)
-    once = set(zip(*(part.tolist() for part in np.divmod(numbers[times == 1], count)), strict=True))
+    edges, _, times = edges_of(triangles)
+    once = set(zip(*edges[:, times == 1].tolist(), strict=True))
     return {place for place, side in enumerate(sides)
             if (min(side.first, side.second), max(side.first, side.second)) not in once}  # fmt: skip
 
@@ -168,9 +166,7 @@ def with_middles(points: Array, triangles: Indices, sides: list[OutlineSide]) ->
     place_of = np.full(points.shape[1], -1)
     place_of[used] = np.arange(used.size)
     corners, triangles = points[:, used], packed.reshape(3, -1)
-    pairs = np.sort(np.hstack([triangles[[0, 1]], triangles[[1, 2]], triangles[[0, 2]]]), axis=0)
-    numbers, place = np.unique(pairs[0] * used.size + pairs[1], return_inverse=True)
-    edges = np.stack(np.divmod(numbers, used.size))
+    edges, place, _ = edges_of(triangles)
     middles = 0.5 * (corners[:, edges[0]] + corners[:, edges[1]])
     place_of_edge = {(a, b): i for i, (a, b) in enumerate(edges.T.tolist())}
     for side in sides:
@@ -244,7 +240,7 @@ def relaxed_nodes(region: PlanarRegion, field: SizeField, outline: Array, inside
     at_outline = field.at(outline)
     for _ in range(_ROUNDS):
         triangles = inner_triangles(region, points)
-        edges = edges_of(triangles)
+        edges, _, _ = edges_of(triangles)
         at_nodes = np.concatenate([at_outline, field.at(points[:, fixed:])])
         wanted = 0.5 * (at_nodes[edges[0]] + at_nodes[edges[1]])
         for _ in range(_MOVES_A_ROUND):

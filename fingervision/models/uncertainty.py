@@ -21,13 +21,12 @@ from fingervision.domain.errors import FingervisionError, ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.parameter import Estimate
 from fingervision.models.answer_figures import LINEAR, Physics
-from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_figures import gripper_figures
 from fingervision.models.gripper_mechanism import check_outline, half_mechanism, redrawn
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.lumped import LumpedGripper, MechanismFrame
+from fingervision.models.lumped import LumpedGripper
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_figures import mechanism_figures
+from fingervision.models.mechanism_figures import mechanism_figures, quickest_model
 from fingervision.models.out_of_plane import out_of_plane
 from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 from fingervision.models.triangulate import triangulate
@@ -347,9 +346,4 @@ def mechanism_uncertainty(
     numbers : mapping of str to Estimate
         The uncertain dimensions: `MechanismDrawing.estimates`.
     """
-
-    def evaluate(changes: Mapping[str, float]) -> Mapping[str, float | None]:
-        mechanism = redrawn(changes)
-        return mechanism_figures(MechanismFrame(mechanism) if mechanism.flexures else MechanismPlate(mechanism))
-
-    return propagate(evaluate, numbers, samples=_SAMPLES)
+    return propagate(lambda changes: mechanism_figures(quickest_model(redrawn(changes))), numbers, samples=_SAMPLES)

@@ -11,7 +11,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError, UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import Physics
-from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping, parse_damping
+from fingervision.models.damping import Damping, ModalDamping, PaperDamping, RayleighDamping, parse_damping
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.modal_model import ModalModel, frequency_response, modal_motion, resolved_frequencies_hz
@@ -48,7 +48,9 @@ def integrated(model: ModalModel, ratios: np.ndarray, drive: DriveHistory, kinks
     return np.concatenate(rows)
 
 
-@pytest.mark.parametrize("damping", [ModalDamping(0.025), LossFactor(0.1), PaperDamping()], ids=["modal", "loss", "4"])
+@pytest.mark.parametrize(
+    "damping", [ModalDamping(0.025), parse_damping("loss:0.1"), PaperDamping()], ids=["modal", "loss", "4"]
+)
 def test_step_response_against_an_adaptive_integration(lumped: LumpedGripper, damping: Damping) -> None:
     """A step of 0.5 mm within 2 ms, compared with scipy's DOP853 on the modes' equations, with kinks of the drive as
     jumps of speed.

@@ -6,7 +6,7 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import Physics
-from fingervision.models.damping import Damping, LossFactor, ModalDamping, PaperDamping, RayleighDamping, paper_rate
+from fingervision.models.damping import Damping, ModalDamping, PaperDamping, RayleighDamping, paper_rate, parse_damping
 from fingervision.models.generalized_alpha import integrate
 from fingervision.models.lumped import LumpedGripper
 from fingervision.models.modal_model import modal_motion
@@ -41,7 +41,7 @@ def test_rayleigh_and_loss_factor() -> None:
     assert rayleigh.ratios(np.array([low, high])) == pytest.approx([0.025, 0.025])
     assert rayleigh.mass_factor_per_s == pytest.approx(12.6, abs=0.05)
     assert rayleigh.stiffness_factor_s == pytest.approx(1.96e-5, rel=0.005)
-    assert LossFactor(0.06).ratios(np.array([1.0])) == pytest.approx(0.03)
+    assert parse_damping("loss:0.06").ratios(np.array([1.0])) == pytest.approx(0.03)
 
 
 def modal_gap_mm(
