@@ -71,24 +71,36 @@ Act = Go | Stand | Swing | Close | Rezero | Turn | Shift | Slot
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One motion segment, and the recipe step to which it belongs.
+    """One motion segment as planned, and the recipe step to which it belongs.
 
     Parameters
     ----------
-    act : Go, Stand, Swing, Close, Rezero, Turn, Shift or Slot
-        The action.
+    act : Act
+        What the test bed does.
     step : int
-        Number of the recipe's step, from 1.
+        Number of the recipe step, from 1.
     section : Section
-        The step as written in the recipe, for error messages.
+        The recipe step.
     key : str
-        The setting from which the segment follows.
+        Setting of the step from which the segment follows.
+    seconds : float
+        Expected duration.
+    end_mm : float
+        Position of the stage afterwards.
+    speed_mm_s : float
+        Highest speed; 0 without a motion.
+    reached_mm : tuple of float
+        Positions that the recipe states.
     """
 
     act: Act
     step: int
     section: Section
-    key: str = "kind"
+    key: str
+    seconds: float
+    end_mm: float
+    speed_mm_s: float = 0.0
+    reached_mm: tuple[float, ...] = ()
 
     @property
     def is_continuous(self) -> bool:

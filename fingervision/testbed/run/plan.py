@@ -1,8 +1,7 @@
 """A recipe as a sequence of motion segments, and whether the actuator can make each of them."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from math import ceil, tau
+from math import ceil
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from fingervision.testbed.actuator import MoveCheck
 from fingervision.testbed.motion.move_limits import SoftLimits
 from fingervision.testbed.recipe_kinds import step_of
 from fingervision.testbed.recipe_kinds.sine import fastest_mm_s
-from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
+from fingervision.testbed.run.motion_segments import Act, Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
 
 # Tolerance of the limits for the rounding of positions.
 SLACK_MM = 1e-9
@@ -27,29 +26,8 @@ REST_FRAMES = 5
 LONGEST_S = 30.0 * 86400.0
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """The segments that the test bed will execute.
-
-    Parameters
-    ----------
-    legs : tuple of Leg
-        Segments in order.
-    seconds : tuple of float
-        Expected duration of each segment.
-    """
-
-    legs: tuple[Leg, ...]
-    seconds: tuple[float, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Timed:
-    """One segment with its expected duration, and the position of the stage after it."""
-
-    leg: Leg
-    seconds: float
-    end_mm: float
+Plan = tuple[Leg, ...]
+"""The segments that the test bed will execute, in order."""
 
 
 def plan(
@@ -80,24 +58,19 @@ def plan(
     if recipe.below_force_n > limits.force_n:
         top = Section(recipe.steps[0].path, recipe.text, "", {})
         _beyond(top, "below_force_n", recipe.below_force_n, limits.force_n, "N", "force")
-    done: list[Timed] = []
+    legs: list[Leg] = []
     for number, section in enumerate(recipe.steps, start=1):
-        at_mm = done[-1].end_mm if done else start_mm
-        for timed in timed_segments(number, section, at_mm, limits, rate_hz):
-            if isinstance(timed.leg.act, Slot) and timed.leg.act.size_mm >= view_mm:
-                words = (
-                    f"must be less than the {view_mm:.3g} mm that the camera sees, but is {timed.leg.act.size_mm:g}."
-                )
-                section.refuse(timed.leg.key, words)
-            _check(timed.leg, limits, model, recipe.below_force_n)
-            done.append(timed)
-    return Plan(tuple(one.leg for one in done), tuple(one.seconds for one in done))
+        for leg in legs_of(number, section, legs[-1].end_mm if legs else start_mm, limits, rate_hz):
+            if isinstance(leg.act, Slot) and leg.act.size_mm >= view_mm:
+                words = f"must be less than the {view_mm:.3g} mm that the camera sees, but is {leg.act.size_mm:g}."
+                section.refuse(leg.key, words)
+            _check(leg, limits, model, recipe.below_force_n)
+            legs.append(leg)
+    return tuple(legs)
 
 
-def timed_segments(
-    number: int, section: Section, at_mm: float, limits: SoftLimits, rate_hz: float
-) -> Iterator["Timed"]:
-    """Read one step: yield its segments, each with its duration and end position, without checking limits.
+def legs_of(number: int, section: Section, at_mm: float, limits: SoftLimits, rate_hz: float) -> Iterator[Leg]:
+    """Read one step: yield its segments, without checking limits.
 
     Parameters
     ----------
@@ -118,14 +91,14 @@ def timed_segments(
         The settings of the step are not valid.
     """
     for act, key in step_of(section).acts(section, at_mm):
-        leg = Leg(act, number, section, key)
-        lasts_s, at_mm = _lasts(leg, at_mm, limits, rate_hz)
-        if lasts_s > LONGEST_S:
-            section.refuse(key, f"must end within {LONGEST_S / 86400.0:g} days, but takes {lasts_s:.3g} s.")
-        yield Timed(leg, lasts_s, at_mm)
+        leg = Leg(act, number, section, key, *_foreseen(act, at_mm, limits, rate_hz))
+        if leg.seconds > LONGEST_S:
+            section.refuse(key, f"must end within {LONGEST_S / 86400.0:g} days, but takes {leg.seconds:.3g} s.")
+        at_mm = leg.end_mm
+        yield leg
 
 
-def frames_of(segments: Sequence[Timed], rate_hz: float, settling_s: float) -> tuple[int, int]:
+def frames_of(legs: Sequence[Leg], rate_hz: float, settling_s: float) -> tuple[int, int]:
     """Least and largest number of frames that the segments record.
 
     Each motion may take longer by the settling time of the stage, closing until contact may end at once, and one frame
@@ -133,12 +106,12 @@ def frames_of(segments: Sequence[Timed], rate_hz: float, settling_s: float) -> t
     """
     least = most = 0
     starts = True
-    for leg, seconds in ((each.leg, each.seconds) for each in segments):
+    for leg in legs:
         act = leg.act
         if leg.is_continuous:
             moves = isinstance(act, Go)
             # One more frame is recorded where a motion ends.
-            whole = ceil(seconds * rate_hz - SLACK_MM) + moves
+            whole = ceil(leg.seconds * rate_hz - SLACK_MM) + moves
             rest = REST_FRAMES if starts else 0
             least += rest + (0 if isinstance(act, Close) else whole)
             most += rest + whole + 1 + (ceil(settling_s * rate_hz) if moves else 0)
@@ -148,21 +121,24 @@ def frames_of(segments: Sequence[Timed], rate_hz: float, settling_s: float) -> t
     return least, most
 
 
-def _lasts(leg: Leg, at_mm: float, limits: SoftLimits, rate_hz: float) -> tuple[float, float]:
-    """Duration of a segment (s), and position of the stage after it (mm)."""
-    match leg.act:
+def _foreseen(
+    act: Act, at_mm: float, limits: SoftLimits, rate_hz: float
+) -> tuple[float, float, float, tuple[float, ...]]:
+    """Duration of a segment (s), position of the stage after it (mm), highest speed (mm/s), positions stated (mm)."""
+    match act:
         case Go(to_mm, speed, frames):
-            return abs(to_mm - at_mm) / speed + _points_s(frames, rate_hz), to_mm
+            return abs(to_mm - at_mm) / speed + _points_s(frames, rate_hz), to_mm, speed, (to_mm,)
         case Stand(stands_s, frames):
-            return stands_s + _points_s(frames, rate_hz), at_mm
-        case Swing(mean_mm, _, frequency_hz, cycles):
-            return cycles / frequency_hz, mean_mm
+            return stands_s + _points_s(frames, rate_hz), at_mm, 0.0, ()
+        case Swing(mean_mm, amplitude_mm, frequency_hz, cycles):
+            ends_mm = (mean_mm - amplitude_mm, mean_mm + amplitude_mm)
+            return cycles / frequency_hz, mean_mm, fastest_mm_s(act), ends_mm
         case Close(speed, _):
             # The position of contact is unknown, so that every following step begins with a motion of its own.
-            return abs(at_mm - limits.lower_mm) / speed, limits.lower_mm - SLACK_MM
+            return abs(at_mm - limits.lower_mm) / speed, limits.lower_mm - SLACK_MM, speed, ()
         case Rezero():
-            return REZERO_S, 0.0
-    return 1.0, at_mm
+            return REZERO_S, 0.0, 0.0, ()
+    return 1.0, at_mm, 0.0, ()
 
 
 def _points_s(frames: int | None, rate_hz: float) -> float:
@@ -170,50 +146,32 @@ def _points_s(frames: int | None, rate_hz: float) -> float:
 
 
 def _check(leg: Leg, limits: SoftLimits, model: Model | None, below_force_n: float) -> None:
-    section, act = leg.section, leg.act
-    if isinstance(act, Go | Close) and act.speed_mm_s > limits.speed_mm_s:
-        _beyond(section, "speed_mm_s", act.speed_mm_s, limits.speed_mm_s, "mm/s", "speed")
-    if isinstance(act, Swing) and fastest_mm_s(act) > limits.speed_mm_s:
-        _beyond(section, "frequency_hz", fastest_mm_s(act), limits.speed_mm_s, "mm/s", "speed of the sine")
-    if isinstance(act, Close) and act.below_force_n > min(limits.force_n, below_force_n):
-        _beyond(section, "below_force_n", act.below_force_n, min(limits.force_n, below_force_n), "N", "force")
-    for at_mm in _reached_mm(leg):
-        if at_mm > limits.upper_mm + SLACK_MM:
-            _beyond(section, leg.key, at_mm, limits.upper_mm, "mm", "position")
-        if at_mm < limits.lower_mm - SLACK_MM:
-            _below(section, leg.key, at_mm, limits.lower_mm, "position")
+    section, act, most_n = leg.section, leg.act, min(limits.force_n, below_force_n)
+    if leg.speed_mm_s > limits.speed_mm_s:
+        key, what = ("frequency_hz", "speed of the sine") if isinstance(act, Swing) else ("speed_mm_s", "speed")
+        _beyond(section, key, leg.speed_mm_s, limits.speed_mm_s, "mm/s", what)
+    if isinstance(act, Close) and act.below_force_n > most_n:
+        _beyond(section, "below_force_n", act.below_force_n, most_n, "N", "force")
+    for at_mm in leg.reached_mm:
+        if not limits.lower_mm - SLACK_MM <= at_mm <= limits.upper_mm + SLACK_MM:
+            limit_mm = limits.upper_mm if at_mm > limits.upper_mm else limits.lower_mm
+            _beyond(section, leg.key, at_mm, limit_mm, "mm", "position")
         if model is None:
             continue
         answer = model.respond(np.array([at_mm]))
-        if answer.force_n is not None and abs(float(answer.force_n[0])) > min(limits.force_n, below_force_n):
-            needed_n = abs(float(answer.force_n[0]))
-            _beyond(section, leg.key, needed_n, min(limits.force_n, below_force_n), "N", f"force at {at_mm:g} mm")
-        if float(answer.gap_mm[0]) < limits.gap_mm - SLACK_MM:
-            _below(section, leg.key, float(answer.gap_mm[0]), limits.gap_mm, f"gap at {at_mm:g} mm")
-
-
-def _reached_mm(leg: Leg) -> Iterator[float]:
-    match leg.act:
-        case Go(to_mm, _, _):
-            yield to_mm
-        case Swing(mean_mm, amplitude_mm, _, _):
-            yield mean_mm - amplitude_mm
-            yield mean_mm + amplitude_mm
+        needed_n = 0.0 if answer.force_n is None else abs(float(answer.force_n[0]))
+        if needed_n > most_n:
+            _beyond(section, leg.key, needed_n, most_n, "N", f"force at {at_mm:g} mm")
+        if (gap_mm := float(answer.gap_mm[0])) < limits.gap_mm - SLACK_MM:
+            _beyond(section, leg.key, gap_mm, limits.gap_mm, "mm", f"gap at {at_mm:g} mm")
 
 
 def _beyond(section: Section, key: str, value: float, limit: float, unit: str, what: str) -> None:
+    way, much = ("beyond", "much") if value > limit else ("below", "little")
     section.refuse(
         key,
-        f"leads beyond the test bed's limit of {what}, {limit:g} {unit}: it needs {value:g}, which is "
-        f"{value - limit:.3g} {unit} too much. Nothing was moved.",
-    )
-
-
-def _below(section: Section, key: str, value: float, limit: float, what: str) -> None:
-    section.refuse(
-        key,
-        f"leads below the test bed's limit of {what}, {limit:g} mm: it needs {value:g}, which is "
-        f"{limit - value:.3g} mm too little. Nothing was moved.",
+        f"leads {way} the test bed's limit of {what}, {limit:g} {unit}: it needs {value:g}, which is "
+        f"{abs(value - limit):.3g} {unit} too {much}. Nothing was moved.",
     )
 
 
@@ -225,29 +183,17 @@ def check_moves(plan: Plan, actuator: MoveCheck, limits: SoftLimits, at_mm: floa
     LimitError
         With the line of the recipe, and the actuator's reason.
     """
-    for leg in plan.legs:
-        to_mm, speed_mm_s = at_mm, 0.0
-        match leg.act:
-            case Go(to, speed):
-                to_mm, speed_mm_s = to, speed
-            case Swing(mean, amplitude, frequency_hz):
-                if actuator.has_steps:
-                    raise LimitError(
-                        f"kind in {leg.section.at('kind')} cannot be executed: a sine consists of many short moves to "
-                        "intermediate positions, but this actuator can only move to the target positions of its step "
-                        "data. Use a triangle or a staircase between two target positions of the step data. Nothing "
-                        "was moved."
-                    )
-                to_mm, speed_mm_s = mean + amplitude, tau * frequency_hz * abs(amplitude)
-            case Close(speed):
-                to_mm, speed_mm_s = limits.lower_mm, speed
-            case Rezero():
-                at_mm = 0.0
-                continue
-        if to_mm == at_mm:
-            continue
-        try:
-            actuator.check(at_mm, to_mm, speed_mm_s)
-        except FingervisionError as error:
-            raise LimitError(f"{leg.key} in {leg.section.at(leg.key)} cannot be executed: {error}") from error
-        at_mm = to_mm
+    for leg in plan:
+        if isinstance(leg.act, Swing) and actuator.has_steps:
+            raise LimitError(
+                f"kind in {leg.section.at('kind')} cannot be executed: a sine consists of many short moves to "
+                "intermediate positions, but this actuator can only move to the target positions of its step data. "
+                "Use a triangle or a staircase between two target positions of the step data. Nothing was moved."
+            )
+        to_mm = leg.reached_mm[-1] if leg.reached_mm else max(leg.end_mm, limits.lower_mm)
+        if leg.speed_mm_s and to_mm != at_mm:
+            try:
+                actuator.check(at_mm, to_mm, leg.speed_mm_s)
+            except FingervisionError as error:
+                raise LimitError(f"{leg.key} in {leg.section.at(leg.key)} cannot be executed: {error}") from error
+        at_mm = leg.end_mm

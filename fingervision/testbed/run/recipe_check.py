@@ -9,8 +9,8 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.planned_bed import PlannedBed
-from fingervision.testbed.run.motion_segments import Close, Go, Leg, Swing
-from fingervision.testbed.run.plan import SLACK_MM, Timed, check_moves, frames_of, plan, timed_segments
+from fingervision.testbed.run.motion_segments import Leg
+from fingervision.testbed.run.plan import SLACK_MM, check_moves, frames_of, legs_of, plan
 from fingervision.testbed.run.run_folder import BYTES_PER_PX
 
 POSITIONS = 41
@@ -99,7 +99,7 @@ def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
     """
     at_mm = 0.0
     steps: list[CheckedStep] = []
-    timed: list[Timed] = []
+    legs: list[Leg] = []
     for number, section in enumerate(recipe.steps, start=1):
         refusal = None
         try:
@@ -108,26 +108,23 @@ def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
         except FingervisionError as error:
             refusal = str(error)
         try:
-            segments = tuple(timed_segments(number, section, at_mm, bed.limits, bed.rate_hz))
+            own = tuple(legs_of(number, section, at_mm, bed.limits, bed.rate_hz))
         except FingervisionError:
             # The settings of the step are not valid, so that there is no motion to describe.
-            segments = ()
-        steps.append(_described(number, section, segments, at_mm, bed, refusal))
-        timed += segments
+            own = ()
+        steps.append(_described(number, section, own, at_mm, bed, refusal))
+        legs += own
         at_mm = steps[-1].to_mm
-    frames, at_most = frames_of(timed, bed.rate_hz, bed.actuator.limits.settling_s)
+    frames, at_most = frames_of(legs, bed.rate_hz, bed.actuator.limits.settling_s)
     megabytes = at_most * bed.size_px[0] * bed.size_px[1] * BYTES_PER_PX / 1e6
     return RecipeCheck(bed, tuple(steps), sum(step.seconds for step in steps), frames, at_most, megabytes)
 
 
 def _described(
-    number: int, section: Section, segments: Sequence[Timed], at_mm: float, bed: PlannedBed, refusal: str | None
+    number: int, section: Section, legs: Sequence[Leg], at_mm: float, bed: PlannedBed, refusal: str | None
 ) -> CheckedStep:
-    reached = [at_mm, *(segment.end_mm for segment in segments)]
-    to_mm = reached[-1]
-    for segment in segments:
-        if isinstance(swing := segment.leg.act, Swing):
-            reached += [swing.mean_mm - swing.amplitude_mm, swing.mean_mm + swing.amplitude_mm]
+    to_mm = legs[-1].end_mm if legs else at_mm
+    reached = [at_mm, *(mm for leg in legs for mm in (leg.end_mm, *leg.reached_mm))]
     # Beyond the limits, predictions of the gripper's model are meaningless, because the test bed does not go there.
     within = bed.limits.lower_mm - SLACK_MM <= min(reached) and max(reached) <= bed.limits.upper_mm + SLACK_MM
     gap_mm, force_n = _foretold(min(reached), max(reached), bed) if within and refusal is None else (None, None)
@@ -138,21 +135,12 @@ def _described(
         to_mm=to_mm,
         lower_mm=min(reached),
         upper_mm=max(reached),
-        speed_mm_s=max((_speed_mm_s(segment.leg) for segment in segments), default=0.0),
-        seconds=sum(segment.seconds for segment in segments),
+        speed_mm_s=max((leg.speed_mm_s for leg in legs), default=0.0),
+        seconds=sum(leg.seconds for leg in legs),
         gap_mm=gap_mm,
         force_n=force_n,
         refusal=refusal,
     )
-
-
-def _speed_mm_s(leg: Leg) -> float:
-    match leg.act:
-        case Go(_, speed, _) | Close(speed, _):
-            return speed
-        case Swing(_, amplitude_mm, frequency_hz, _):
-            return float(2.0 * np.pi * frequency_hz * abs(amplitude_mm))
-    return 0.0
 
 
 def _foretold(lower_mm: float, upper_mm: float, bed: PlannedBed) -> tuple[tuple[float, float] | None, float | None]:

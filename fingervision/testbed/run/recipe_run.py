@@ -117,16 +117,16 @@ class Runner:
             watch.look()
         watch.find_fingers()
         first, approach = self._first_leg()
-        total_s, done_s = sum(self.plan.seconds), sum(self.plan.seconds[:first])
+        total_s, done_s = (sum(leg.seconds for leg in legs) for legs in (self.plan, self.plan[:first]))
         foreseen_s = moved_s = ramps_s = 0.0
         recorded = record.counts.recorded
-        record.event("began", f"The plan has {len(self.plan.legs)} motion segments.", leg=first, frame=recorded)
+        record.event("began", f"The plan has {len(self.plan)} motion segments.", leg=first, frame=recorded)
         self._rest(first if approach is None else approach)
         if approach is not None:
-            watch.leg = self.plan.legs[approach]
+            watch.leg = self.plan[approach]
             record.event("approach", f"Step {watch.leg.step} once more: {watch.leg.words}.", step=watch.leg.step)
             self._do(watch.leg, approach)
-        for number, (leg, seconds) in enumerate(zip(self.plan.legs, self.plan.seconds, strict=True)):
+        for number, leg in enumerate(self.plan):
             if number < first:
                 continue
             watch.leg = leg
@@ -142,7 +142,7 @@ class Runner:
                 moved_s += watch.bed.clock.now_s() - watch.paused_s - began_s
                 ramps_s += watch.bed.actuator.limits.settling_s + RAMP_S
                 foreseen_s += abs(leg.act.to_mm - from_mm) / leg.act.speed_mm_s
-            done_s += seconds
+            done_s += leg.seconds
             self.on_progress(done_s, total_s)
         record.write(at_once=True)
         if moved_s < LEAST_SHARE * foreseen_s:
@@ -176,7 +176,7 @@ class Runner:
         With replay, or in a new run, the first segment is 0. Otherwise, it is the segment of the first frame without a
         row: rows are written some frames late, so that a killed program may have begun a later segment.
         """
-        folder, legs = self.watch.record.folder, self.plan.legs
+        folder, legs = self.watch.record.folder, self.plan
         if self.watch.bed.replays or not folder.resumed:
             return 0, None
         self.watch.record.go_on((datetime.now(UTC) - folder.began_at).total_seconds())
@@ -189,14 +189,8 @@ class Runner:
     def _do(self, leg: Leg, number: int) -> None:
         watch = self.watch
         match leg.act:
-            case Go():
-                step_executor.go(watch, leg.act)
-            case Stand():
-                step_executor.stand(watch, leg.act)
-            case Swing():
-                step_executor.swing(watch, leg.act)
-            case Close():
-                step_executor.close(watch, leg.act)
+            case Go() | Stand() | Swing() | Close():
+                step_executor.MOTIONS[type(leg.act)](watch, leg.act)
             case Slot():
                 self._slots.append(step_executor.slot(watch, leg.act))
             case Rezero():
@@ -215,7 +209,7 @@ class Runner:
 
     def _rest(self, leg: int) -> None:
         """Record the pause at the start of a run, if the following segment is recorded continuously."""
-        if leg < len(self.plan.legs) and self.plan.legs[leg].is_continuous:
+        if leg < len(self.plan) and self.plan[leg].is_continuous:
             for _ in range(REST_FRAMES):
                 self.watch.see(record=True)
 
@@ -307,7 +301,7 @@ def run_recipe(
     folder = BedRunFolder(out, recipe, bed, sight, hidden, before)
     try:
         size_px = (sight.camera.description.width_px, sight.camera.description.height_px)
-        left = max(sum(planned.seconds) * sight.rate_hz - len(folder.rows), 0.0)
+        left = max(sum(leg.seconds for leg in planned) * sight.rate_hz - len(folder.rows), 0.0)
         folder.needs_room(left, size_px)
         record = RunRecord(folder, lambda bed_s, at_once: sight.position.at(bed_s, at_once=at_once), on_row)
         ratio = None if bed.replays or bed.model is None else MotionRatio(bed.model, bed.limits)

@@ -1,8 +1,9 @@
 """Execute one segment of a recipe's plan: move, rest, oscillate, close until contact, measure a slot."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import sin, sqrt, tau
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from fingervision.domain.numbers import with_uncertainty
 from fingervision.domain.status import Status
 from fingervision.measuring.scale import Scale
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.testbed.run.motion_segments import Close, Frames, Go, Slot, Stand, Swing
+from fingervision.testbed.run.motion_segments import Act, Close, Frames, Go, Slot, Stand, Swing
 from fingervision.testbed.run.safety_monitor import Watch
 from fingervision.testbed.run.synchronised_acquisition import Look
 from fingervision.vision.grey import to_grey
@@ -127,6 +128,10 @@ def close(watch: Watch, act: Close) -> None:
     watch.follow(partial(bed.actuator.move, bed.limits.lower_mm, act.speed_mm_s), record=True, until=met)
     why = felt[0] if felt else "no contact was found before the position reached the test bed's limit"
     watch.record.event("closed", f"Closing ended: {why}.", input_mm=watch.sight.position.newest)
+
+
+MOTIONS: Mapping[type[Act], Callable[[Watch, Any], None]] = {Go: go, Stand: stand, Swing: swing, Close: close}
+"""What executes each kind of motion."""
 
 
 def rezero(watch: Watch) -> None:
