@@ -20,15 +20,18 @@ from fingervision.domain.numbers import with_uncertainty
 from fingervision.models.finite_element import FiniteElementGripper, MechanismPlate
 from fingervision.models.gripper_figures import label_of, unit_of
 from fingervision.models.hinge_correction import HingeTheory
-from fingervision.models.inverse_design import Figures, parse_unknown, parse_wanted, solve_dimensions
 from fingervision.models.kinds import by_trust
 from fingervision.models.lumped import LumpedGripper, MechanismFrame
 from fingervision.models.mechanism_figures import response_figures
 from fingervision.models.parameter_sweep import (
     COLUMNS,
+    Figures,
     Variation,
     mechanism_sweep_answers,
+    parse_unknown,
     parse_variation,
+    parse_wanted,
+    solve_dimensions,
     sweep_answers,
     sweep_figures,
     varied,

@@ -187,8 +187,7 @@ def check(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
 
     from fingervision.domain.errors import LimitError
     from fingervision.storage.recipe_toml import read_recipe
-    from fingervision.testbed.planned_bed import planned_bed
-    from fingervision.testbed.run.recipe_check import CheckedStep, check_recipe
+    from fingervision.testbed.run.recipe_check import CheckedStep, check_recipe, planned_bed
 
     def line(step: CheckedStep) -> str:
         gap = "" if step.gap_mm is None else f"{step.gap_mm[0]:.3f} to {step.gap_mm[1]:.3f}"

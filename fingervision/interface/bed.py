@@ -16,8 +16,7 @@ from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import SIMULATED, open_bed
 from fingervision.testbed.manual import manual_control
 from fingervision.testbed.motion.move_limits import SoftLimits
-from fingervision.testbed.planned_bed import planned_bed
-from fingervision.testbed.run.recipe_check import RecipeCheck, check_recipe
+from fingervision.testbed.run.recipe_check import RecipeCheck, check_recipe, planned_bed
 from fingervision.testbed.run.recipe_run import RunDone, run_recipe
 from fingervision.testbed.run.run_folder import rows_before, times_of
 from fingervision.testbed.simulation.injected_effects import hidden_from

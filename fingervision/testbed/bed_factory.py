@@ -19,20 +19,18 @@ from fingervision.models.kinds import REGISTRY, GripperModel, build_model, kinds
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.drive_csv import SAMPLE_COLUMNS
 from fingervision.storage.gripper_toml import read_gripper
-from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_section import Section, read_section
 from fingervision.tables.read import read_simulation_table
 from fingervision.testbed.actuator import Actuator, StageLimits
-from fingervision.testbed.bed import Bed
+from fingervision.testbed.bed import Bed, Operator, operator_of
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.camera import BedCamera
 from fingervision.testbed.clocks.clock import Clock, HostClock, VirtualClock
 from fingervision.testbed.device_kinds import Kind, kind_of
 from fingervision.testbed.force_sensor import ForceSensor
 from fingervision.testbed.motion.move_limits import SoftLimits
-from fingervision.testbed.operator import Operator, operator_of
-from fingervision.testbed.simulation.gripper import SimulatedGripper, sample_gripper
+from fingervision.testbed.simulation.gripper import Followed, SimulatedGripper, sample_gripper
 from fingervision.testbed.simulation.injected_effects import NOTHING, Hidden
-from fingervision.testbed.simulation.recording_actuator import Followed
 from fingervision.testbed.text_protocol import sensor
 from fingervision.testbed.text_protocol.sensor import TextSensor, opened_sensor
 
@@ -40,7 +38,7 @@ SIMULATED = "simulated"
 SCHEMA = 1
 NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 PARTS = ("actuator", "force_sensor", "camera")
-TOP_KEYS = ("schema", "name", "seed", "below_tip_mm", *PARTS, "channel", "gripper", "limits", "scale")
+TOP_KEYS = ("name", "seed", "below_tip_mm", *PARTS, "channel", "gripper", "limits", "scale")
 
 
 def open_bed(
@@ -72,11 +70,7 @@ def open_bed(
     DataError, InputFileError, UsageError
         The configuration is not valid, or a part cannot be opened; parts that are already open are closed.
     """
-    top = read_configuration(name)
-    sections = {part: top.table(part) for part in PARTS if part in top.values}
-    if "actuator" not in sections:
-        top.refuse(None, "must have an [actuator], but has none: add it with its kind.")
-    parts = {part: kind_of(part, section) for part, section in sections.items()}
+    top, sections, parts = stated_parts(name)
     all_simulated = all(kind.SIMULATED for kind in parts.values())
     has_gripper = "gripper" in top.values
     if hidden.effects and not has_gripper:
@@ -167,6 +161,15 @@ def channel_name(section: Section, known: Collection[str]) -> str:
     return name
 
 
+def stated_parts(name: str) -> tuple[Section, dict[str, Section], dict[str, Kind]]:
+    """Read the configuration of a test bed: the whole, and the section and kind of each of its devices."""
+    top = read_configuration(name)
+    sections = {part: top.table(part) for part in PARTS if part in top.values}
+    if "actuator" not in sections:
+        top.refuse(None, "must have an [actuator], but has none: add it with its kind.")
+    return top, sections, {part: kind_of(part, section) for part, section in sections.items()}
+
+
 def read_configuration(name: str) -> Section:
     """Read the configuration of a test bed, without opening anything.
 
@@ -177,19 +180,11 @@ def read_configuration(name: str) -> Section:
     """
     if name == SIMULATED:
         with resources.as_file(resources.files("fingervision.testbed").joinpath("simulated.toml")) as path:
-            document, text = read_document(path, "bed")
-        top = Section(path, text, "", document)
-    else:
-        path = Path(name)
-        if path.suffix.lower() != ".toml":
-            raise UsageError(f"--bed must be the word simulated or a file CONFIG.toml, but is {name}.")
-        document, text = read_document(path, "bed")
-        top = Section(path, text, "", document)
-    top.only(TOP_KEYS)
-    schema = top.whole("schema", low=1)
-    if schema > SCHEMA:
-        top.refuse("schema", f"must be at most {SCHEMA}, but is {schema}: use a newer fingervision.")
-    return top
+            return read_section(path, "bed", TOP_KEYS, SCHEMA)
+    path = Path(name)
+    if path.suffix.lower() != ".toml":
+        raise UsageError(f"--bed must be the word simulated or a file CONFIG.toml, but is {name}.")
+    return read_section(path, "bed", TOP_KEYS, SCHEMA)
 
 
 def stated_limits(section: Section) -> SoftLimits:

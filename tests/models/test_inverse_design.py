@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from fingervision.cli.model import command
 from fingervision.domain.errors import ModelError, UsageError
 from fingervision.models.finite_element import MechanismPlate
-from fingervision.models.inverse_design import Unknown, parse_unknown, parse_wanted, solve_dimensions
+from fingervision.models.parameter_sweep import Unknown, parse_unknown, parse_wanted, solve_dimensions
 from fingervision.storage.mechanism_toml import read_drawing
 
 STAGE = """

@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 from fingervision.cli import cli
 from fingervision.domain.errors import FingervisionError
 from fingervision.storage.drive_csv import read_samples
-from fingervision.testbed.planned_bed import planned_bed
+from fingervision.testbed.run.recipe_check import planned_bed
 from tests.testbed.board_bed import CONTRACT_STEPS, written_bed
 
 HEAD = 'schema = 1\nname = "test"\nbelow_force_n = 2.9\n'

@@ -10,11 +10,10 @@ from fingervision.storage.board_toml import read_board
 from fingervision.storage.recipe_toml import read_steps
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
-from fingervision.testbed.board import controller_settings, wire
+from fingervision.testbed.board import motions, wire
 from fingervision.testbed.board.board import KEY, Board, board_of
-from fingervision.testbed.board.controller_settings import Codes, Waits, codes_of, waits_of
 from fingervision.testbed.board.link import fingervision_at
-from fingervision.testbed.board.motions import Motions, Run
+from fingervision.testbed.board.motions import Codes, Motions, Run, Waits, codes_of, waits_of
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import Reading
@@ -22,7 +21,7 @@ from fingervision.testbed.motion.move_limits import PUBLISHED, PUBLISHED_KEYS, c
 from fingervision.testbed.motion.step_checks import jog_step, planned, route
 
 SIMULATED = False
-KEYS = (KEY, "steps", *PUBLISHED_KEYS, *controller_settings.KEYS)
+KEYS = (KEY, "steps", *PUBLISHED_KEYS, *motions.KEYS)
 # A motion counts as stuck if it takes longer than PATIENCE times the duration of its profile, plus PATIENCE_S.
 PATIENCE, PATIENCE_S = 1.5, 1.0
 READ_EVERY_S = 0.005

@@ -18,7 +18,7 @@ from fingervision.testbed.camera import Latency
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import SimulatedGripper
-from fingervision.testbed.simulation.optics import Optics, hidden_in
+from fingervision.testbed.simulation.injected_effects import Optics, hidden_in
 
 KEYS = ("width_px", "height_px", "rate_hz", "px_per_mm", "blur_px", "noise_grey", "latency_s", "jitter_s", "fingers_mm",
         "tip_radius_mm", "off_centre_mm")  # fmt: skip

@@ -6,8 +6,7 @@ from typing import Annotated
 
 from fingervision.domain.field import Field
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.recipe_kinds import Asked, Speed
-from fingervision.testbed.run.motion_segments import Close
+from fingervision.testbed.recipe_kinds import Asked, Close, Speed
 
 
 @dataclass(frozen=True, slots=True)

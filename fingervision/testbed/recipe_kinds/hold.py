@@ -6,8 +6,7 @@ from typing import Annotated
 
 from fingervision.domain.field import Field
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.recipe_kinds import Asked, Frames, From
-from fingervision.testbed.run.motion_segments import Go, Stand
+from fingervision.testbed.recipe_kinds import Asked, Frames, From, Go, Stand
 
 # Speed of the motion to the position, because a hold states no speed: slow enough for a webcam.
 APPROACH_MM_S = 0.5

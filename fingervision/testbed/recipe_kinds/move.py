@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.recipe_kinds import Asked, Frames, Speed, To
-from fingervision.testbed.run.motion_segments import Go
+from fingervision.testbed.recipe_kinds import Asked, Frames, Go, Speed, To
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,7 @@ from typing import Annotated
 
 from fingervision.domain.field import Field
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.recipe_kinds import Asked
-from fingervision.testbed.run.motion_segments import Slot
+from fingervision.testbed.recipe_kinds import Asked, Slot
 
 
 @dataclass(frozen=True, slots=True)

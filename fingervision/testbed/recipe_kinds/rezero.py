@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.recipe_kinds import Asked
-from fingervision.testbed.run.motion_segments import Rezero
+from fingervision.testbed.recipe_kinds import Asked, Rezero
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,7 @@ from typing import Annotated
 
 from fingervision.domain.field import Field
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.recipe_kinds import Asked, From
-from fingervision.testbed.run.motion_segments import Go, Swing
+from fingervision.testbed.recipe_kinds import Asked, From, Go, Swing
 
 # The stage moves to the mean position at the highest speed of the sine, but at least at this speed.
 SLOWEST_APPROACH_MM_S = 0.05

@@ -6,8 +6,7 @@ from typing import Annotated
 
 from fingervision.domain.field import Field
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.recipe_kinds import Asked, Frames, From, Speed, To
-from fingervision.testbed.run.motion_segments import Go
+from fingervision.testbed.recipe_kinds import Asked, Frames, From, Go, Speed, To
 
 
 @dataclass(frozen=True, slots=True)

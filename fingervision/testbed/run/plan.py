@@ -11,9 +11,8 @@ from fingervision.domain.recipe import Recipe
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import MoveCheck
 from fingervision.testbed.motion.move_limits import SoftLimits
-from fingervision.testbed.recipe_kinds import step_of
+from fingervision.testbed.recipe_kinds import Act, Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn, step_of
 from fingervision.testbed.recipe_kinds.sine import fastest_mm_s
-from fingervision.testbed.run.motion_segments import Act, Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
 
 # Tolerance of the limits for the rounding of positions.
 SLACK_MM = 1e-9

@@ -14,9 +14,9 @@ from fingervision.storage.drive_csv import SampleRow
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.manual import manual_control
+from fingervision.testbed.recipe_kinds import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
 from fingervision.testbed.run import step_executor
 from fingervision.testbed.run.controls import Controls
-from fingervision.testbed.run.motion_segments import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
 from fingervision.testbed.run.plan import REST_FRAMES, Plan, check_moves, plan
 from fingervision.testbed.run.run_folder import BedRunFolder
 from fingervision.testbed.run.run_record import Counts, OnRow, RunRecord

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, NoReturn
@@ -241,17 +242,13 @@ class BedRunFolder:
                 for item in islice(VideoFile(str(path / VIDEO)), len(self.rows)):
                     self.table.add(item, None)
             self._video = RecordedVideo(path / VIDEO, None, keep=len(self.rows))
-        except FingervisionError:
+        except BaseException as error:
             self._lock.release()
-            raise
-        except OSError as error:
-            self._lock.release()
+            if isinstance(error, FingervisionError) or not isinstance(error, OSError):
+                raise
             raise OutputError(
                 f"The folder {path} cannot be written ({error.strerror}): name another folder with --out."
             ) from error
-        except BaseException:
-            self._lock.release()
-            raise
         self.last_s = self.rows[-1].time_s if self.rows else 0.0
         """Time of the last frame whose position is known (s)."""
         if earlier:
@@ -306,14 +303,10 @@ class BedRunFolder:
 
     def break_off(self, why: str) -> None:
         """Close the folder of an interrupted run; its content remains valid, and the run may be continued."""
-        with suppress(FingervisionError):
-            self.end_pictures()
-        with suppress(FingervisionError):
-            self._files.event({"time_s": round(self.last_s, 6), "event": "stopped", "words": why})
-        with suppress(FingervisionError):
-            self._samples.close()
-        with suppress(FingervisionError):
-            self._files.close()
+        last = {"time_s": round(self.last_s, 6), "event": "stopped", "words": why}
+        for end in (self.end_pictures, partial(self._files.event, last), self._samples.close, self._files.close):
+            with suppress(FingervisionError):
+                end()
         self._lock.release()
 
 

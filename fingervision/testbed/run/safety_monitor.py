@@ -15,8 +15,8 @@ from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.motion.move_limits import SoftLimits
+from fingervision.testbed.recipe_kinds import Close, Go, Leg
 from fingervision.testbed.run.controls import Controls
-from fingervision.testbed.run.motion_segments import Close, Go, Leg
 from fingervision.testbed.run.run_record import RunRecord
 from fingervision.testbed.run.synchronised_acquisition import Look, Sight
 

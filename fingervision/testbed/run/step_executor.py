@@ -15,7 +15,7 @@ from fingervision.domain.numbers import with_uncertainty
 from fingervision.domain.status import Status
 from fingervision.measuring.scale import Scale
 from fingervision.storage.gaps_csv import GapRow
-from fingervision.testbed.run.motion_segments import Act, Close, Frames, Go, Slot, Stand, Swing
+from fingervision.testbed.recipe_kinds import Act, Close, Frames, Go, Slot, Stand, Swing
 from fingervision.testbed.run.safety_monitor import Watch
 from fingervision.testbed.run.synchronised_acquisition import Look
 from fingervision.vision.grey import to_grey

@@ -12,11 +12,11 @@ from string import Formatter
 from typing import Any
 
 from fingervision.domain.errors import DataError
-from fingervision.storage.toml_section import Section, read_document
+from fingervision.storage.toml_section import Section, read_section
 
 FILES = Path(__file__).parent / "files"
 SCHEMA = 1
-TOP = ("schema", "name", "baud", "serial", "line_end", "answer_end", "open_s", "answer_s", "refusal")
+TOP = ("name", "baud", "serial", "line_end", "answer_end", "open_s", "answer_s", "refusal")
 SAID = ("say", "line_end", "reply", "done", "answer_s")
 ACTIONS: Mapping[str, tuple[str, ...]] = {
     "position": (*SAID, "per_mm"),
@@ -126,11 +126,7 @@ def words_of(section: Section, folder: Path, needed: tuple[str, ...]) -> Words:
     if not name.endswith(".toml"):
         section.word("words", of=known_words())
     path = folder / name if name.endswith(".toml") else FILES / f"{name}.toml"
-    document, text = read_document(path, "file of words")
-    top = Section(path, text, "", document)
-    top.only((*TOP, *ACTIONS, "open", "settings"))
-    if top.whole("schema", low=1) > SCHEMA:
-        top.refuse("schema", f"must be at most {SCHEMA}, but is {top.values['schema']}: use a newer fingervision.")
+    top = read_section(path, "file of words", (*TOP, *ACTIONS, "open", "settings"), SCHEMA)
     missing = [each for each in needed if each not in top.values]
     if missing:
         top.refuse(None, f"must have [{'], ['.join(needed)}], but has no [{missing[0]}]: add it.")
