@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.gripper import Gripper, Material, SNLine
-from fingervision.models.answer_figures import LoadedState, ModelFigures
+from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress
 from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import mechanical_advantage
@@ -184,6 +184,17 @@ _UNITS = {
 _ENDS: Mapping[str, str] = {"_mm": "mm", "_hz": "Hz", "_n": "N", "_mpa": "MPa", "_percent": "%"}
 
 
+_RANGE_ENDS, _LOADS = ("lowest", "highest"), ("input_mm", "gap_mm", "force_n", "grip_n", "stress_mpa")
+_COLUMNS = (
+    "gap_per_input", "input_stiffness_n_mm", "peak_stress_mpa_per_mm", "peak_x_mm", "peak_y_mm", "input_at_yield_mm",
+    "first_mode_drive_free_hz", "first_mode_drive_held_hz", "first_swaying_mode_hz", "first_out_of_plane_mode_hz",
+    "contact_input_mm", "gap_at_yield_mm", *(field.name for field in fields(OperatingFigures)), "sag_out_of_plane_mm",
+    *(f"{end}_{name}" for end in _RANGE_ENDS for name in _LOADS), "endurance_cycles",
+    *(f"model_error_{of}_percent" for of in ("slope", "force", "modes", "out_of_plane", "grip", "sag")),
+)  # fmt: skip
+"""Columns of models.csv, in order; those that a kind of model cannot compute stay empty."""
+
+
 def gripper_figures(
     gripper: Gripper, model: Any, inputs: Sequence[float] | NDArray[np.float64], figures: ModelFigures | None = None
 ) -> dict[str, float | None]:
@@ -207,48 +218,55 @@ def gripper_figures(
         Numbers by name; the unit ends the name (`unit_of`). None for a number that the model cannot compute.
     """
     figures = figures or model.figures()
-    peak = figures.peak_stress
-    row: dict[str, float | None] = {
+    row: dict[str, float | None] = dict.fromkeys(_COLUMNS)
+    row |= {
         "gap_per_input": figures.gap_per_input,
         "input_stiffness_n_mm": figures.input_stiffness_n_mm,
-        "peak_stress_mpa_per_mm": None if peak is None else peak.mpa_per_mm,
-        "peak_x_mm": None if peak is None else peak.place_mm[0],
-        "peak_y_mm": None if peak is None else peak.place_mm[1],
-        "input_at_yield_mm": None if peak is None else opening_at_yield_mm(model, gripper.material.yield_mpa),
         "first_mode_drive_free_hz": next(iter(figures.free_modes_hz), None),
         "first_mode_drive_held_hz": next(iter(figures.locked_modes_hz), None),
         "first_swaying_mode_hz": next(iter(figures.swaying_modes_hz), None),
         "first_out_of_plane_mode_hz": next(iter(figures.out_of_plane_modes_hz), None),
         "contact_input_mm": figures.contact_input_mm,
-    }
-    at_yield = row["input_at_yield_mm"]
-    row["gap_at_yield_mm"] = None if at_yield is None else model.loaded([at_yield])[0].gap_mm
-    own = asdict(operating_figures(model)) if isinstance(model, DrawnGripper) else {}
-    row |= {field.name: own.get(field.name) for field in fields(OperatingFigures)}
-    row["sag_out_of_plane_mm"] = figures.sag_out_of_plane_mm
-    ends = [float(min(inputs)), float(max(inputs))]
-    if peak is not None:
-        states = model.loaded(ends)
-        loads = [(s.input_mm, s.gap_mm, s.force_n, s.grip_n, s.stress_mpa) for s in states]
-    else:
-        answer = model.respond(np.array(ends))
-        forces = (None, None) if answer.force_n is None else answer.force_n.tolist()
-        loads = [(ends[i], float(answer.gap_mm[i]), forces[i], None, None) for i in (0, 1)]
-    for end, load in zip(("lowest", "highest"), loads, strict=True):
-        names = (f"{end}_input_mm", f"{end}_gap_mm", f"{end}_force_n", f"{end}_grip_n", f"{end}_stress_mpa")
-        row |= dict(zip(names, load, strict=True))
-    life = None if peak is None else life_over(gripper.material, states)
-    row["endurance_cycles"] = None if life is None else life.cycles
-    row |= {
+        "sag_out_of_plane_mm": figures.sag_out_of_plane_mm,
         "model_error_slope_percent": 100.0 * figures.slope_error,
         "model_error_force_percent": 100.0 * figures.force_error,
-        "model_error_modes_percent": 100.0 * figures.mode_error if figures.free_modes_hz else None,
-        "model_error_out_of_plane_percent": 100.0 * figures.out_of_plane_error
-        if figures.out_of_plane_modes_hz
-        else None,
-        "model_error_grip_percent": None if peak is None else 100.0 * figures.grip_error,
-        "model_error_sag_percent": None if figures.sag_out_of_plane_mm is None else 100.0 * figures.sag_error,
     }
+    if isinstance(model, DrawnGripper):
+        row |= asdict(operating_figures(model))
+    ends = [float(min(inputs)), float(max(inputs))]
+    if figures.peak_stress is None:
+        answer = model.respond(np.array(ends))
+        forces = (None, None) if answer.force_n is None else answer.force_n.tolist()
+        for end, *load in zip(_RANGE_ENDS, ends, answer.gap_mm.tolist(), forces, strict=True):
+            row |= {f"{end}_{name}": value for name, value in zip(_LOADS, load, strict=False)}
+    else:
+        row |= _stressed(gripper.material, model, figures.peak_stress, ends)
+        row["model_error_grip_percent"] = 100.0 * figures.grip_error
+    if figures.free_modes_hz:
+        row["model_error_modes_percent"] = 100.0 * figures.mode_error
+    if figures.out_of_plane_modes_hz:
+        row["model_error_out_of_plane_percent"] = 100.0 * figures.out_of_plane_error
+    if figures.sag_out_of_plane_mm is not None:
+        row["model_error_sag_percent"] = 100.0 * figures.sag_error
+    return row
+
+
+def _stressed(
+    material: Material, model: DrawnGripper, peak: PeakStress, ends: Sequence[float]
+) -> dict[str, float | None]:
+    """Numbers that follow from the stress, and the loads at both ends of a range of inputs."""
+    at_yield, states = opening_at_yield_mm(model, material.yield_mpa), model.loaded(ends)
+    row: dict[str, float | None] = {
+        "peak_stress_mpa_per_mm": peak.mpa_per_mm,
+        "peak_x_mm": peak.place_mm[0],
+        "peak_y_mm": peak.place_mm[1],
+        "input_at_yield_mm": at_yield,
+        "gap_at_yield_mm": model.loaded([at_yield])[0].gap_mm,
+    }
+    for end, state in zip(_RANGE_ENDS, states, strict=True):
+        row |= {f"{end}_{name}": getattr(state, name) for name in _LOADS}
+    if (life := life_over(material, states)) is not None:
+        row["endurance_cycles"] = life.cycles
     return row
 
 

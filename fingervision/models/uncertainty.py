@@ -9,7 +9,7 @@ other.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import isfinite
 from operator import attrgetter
 
 import numpy as np
@@ -145,41 +145,36 @@ def propagate(
         If the drawing is not valid with a dimension changed by its uncertainty, or too many samples are invalid
         drawings.
     """
-    used = {name: estimate.u or 0.0 for name, estimate in numbers.items() if estimate.u}
-    base = evaluate({})
-    slopes: dict[str, dict[str, float]] = {figure: {} for figure, value in base.items() if value is not None}
-    bends: dict[str, dict[str, float]] = {figure: {} for figure in slopes}
-    for name, u in used.items():
-        step = max(u, _LEAST_STEP * abs(numbers[name].value))
-        low, high = (_moved(evaluate, name, numbers[name].value, by) for by in (-step, step))
-        for figure in list(slopes):
-            a, b, middle = low[figure], high[figure], base[figure]
-            if a is None or b is None or middle is None:
-                del slopes[figure], bends[figure]
-                continue
-            slopes[figure][name] = 0.5 * (b - a) * u / step
-            bends[figure][name] = 0.5 * (a + b - 2.0 * middle) * (u / step) ** 2
-    spread = {figure: sqrt(sum(s**2 for s in own.values())) for figure, own in slopes.items()}
-    bent = [f for f, u in spread.items() if _is_bent(u, list(bends[f].values()), float(base[f] or 0.0))]
-    drawn = _samples(evaluate, used, bent, samples, seed) if bent else {}
-    found = {}
-    for figure, u in spread.items():
-        value = float(base[figure] or 0.0)
-        if u <= _ROUNDING * abs(value) and figure not in drawn:
+    used = {name: estimate.u for name, estimate in numbers.items() if estimate.u}
+    u = np.array(list(used.values())).reshape(-1, 1)
+    step = np.maximum(u, _LEAST_STEP * np.abs([numbers[name].value for name in used]).reshape(-1, 1))
+    answers = [evaluate({})]
+    for name, (size,) in zip(used, step.tolist(), strict=True):
+        answers += [_moved(evaluate, name, numbers[name].value, by) for by in (-size, size)]
+    known = [figure for figure in answers[0] if all(answer[figure] is not None for answer in answers)]
+    values = np.array([[answer[figure] for figure in known] for answer in answers], dtype=float)
+    middle, low, high = values[0], values[1::2], values[2::2]
+    slopes, bends = 0.5 * (high - low) * u / step, 0.5 * (low + high - 2.0 * middle) * (u / step) ** 2
+    spread = np.sqrt(np.sum(slopes**2, axis=0))
+    widening = np.sqrt(spread**2 + 2.0 * np.sum(bends**2, axis=0)) - spread
+    missed = np.maximum(np.abs(bends.sum(axis=0)), widening)
+    bent = missed > np.maximum(_BENDS * spread, _ROUNDING * np.abs(middle))
+    sought = [figure for figure, is_bent in zip(known, bent.tolist(), strict=True) if is_bent]
+    drawn = _samples(evaluate, used, sought, samples, seed) if sought else {}
+    parts, found = slopes**2 + 2.0 * bends**2, {}
+    for place, figure in enumerate(known):
+        value, linear_u, own = float(middle[place]), float(spread[place]), drawn.get(figure)
+        if linear_u <= _ROUNDING * abs(value) and own is None:
             continue
-        parts = {name: s**2 + 2.0 * bends[figure][name] ** 2 for name, s in slopes[figure].items()}
-        shares = sorted(((name, part / sum(parts.values())) for name, part in parts.items()), key=lambda pair: -pair[1])
-        own = drawn.get(figure)
-        found[figure] = FigureUncertainty(
-            value=value,
-            u=u if own is None else float(own.std(ddof=1)),
-            sampled=own is not None,
-            mean=value if own is None else float(own.mean()),
-            interval=(value - 1.96 * u, value + 1.96 * u)
-            if own is None
-            else (float(np.quantile(own, 0.025)), float(np.quantile(own, 0.975))),
-            shares=tuple(shares[:_NAMED]),
-        )
+        shares = parts[:, place] / parts[:, place].sum()
+        largest = [(list(used)[k], float(shares[k])) for k in np.argsort(-shares, kind="stable")[:_NAMED]]
+        if own is None:
+            ends = (value - 1.96 * linear_u, value + 1.96 * linear_u)
+            found[figure] = FigureUncertainty(value, linear_u, False, value, ends, tuple(largest))
+        else:
+            ends = (float(np.quantile(own, 0.025)), float(np.quantile(own, 0.975)))
+            u_own = float(own.std(ddof=1))
+            found[figure] = FigureUncertainty(value, u_own, True, float(own.mean()), ends, tuple(largest))
     return found
 
 
@@ -191,11 +186,6 @@ def _moved(evaluate: Evaluate, name: str, value: float, by: float) -> Mapping[st
             f"The uncertainty of {name} is too large: with {name} = {value + by:g}, one standard uncertainty from its "
             f"stated value, the drawing cannot be computed ({str(error).rstrip('.')}). State a smaller uncertainty."
         ) from error
-
-
-def _is_bent(u: float, bends: list[float], value: float) -> bool:
-    shift, widening = abs(sum(bends)), sqrt(u**2 + 2.0 * sum(b**2 for b in bends)) - u
-    return max(shift, widening) > max(_BENDS * u, _ROUNDING * abs(value))
 
 
 def _samples(
