@@ -276,6 +276,10 @@ class ElasticMechanism(MadeAgain, ABC):
         found = self._of_probes(lambda point: self.motion_mm(moved, point, large=large))
         return {name: (float(x), float(y)) for name, (x, y) in found.items()}
 
+    def pairs_mm(self, moved: Array, *, large: bool) -> dict[str, float]:
+        """Distances of the pairs of probes (mm)."""
+        return pair_distances_mm(self.mechanism, self.probes_mm(moved, large=large), large=large)
+
     def probes_by(self, columns: Array) -> dict[str, Array]:
         """Small motion of every probe by each column of displacements, shape (2, k)."""
         return self._of_probes(lambda point: self.motion_mm(columns, point, large=False))

@@ -6,7 +6,8 @@ An FMU (FMI 2 or 3, model exchange or co-simulation) is run as a function of tim
 import json
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,7 @@ LONGEST_STEP_S = 0.01
 times per period."""
 
 
-def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array], dict[str, Array]]:
+def fmu_function(path: Path, names: Mapping[str, str]) -> "Fmu":
     """Return an FMU as a function of time.
 
     Parameters
@@ -42,11 +43,6 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
     names : mapping of str to str
         Names of the FMU's variables for `input` and `gap`, and their units `input_unit` and `gap_unit`, where stated.
 
-    Returns
-    -------
-    callable
-        Times (s) and inputs (mm) in; gap_mm or left_mm and right_mm, and force_n where there is one, out.
-
     Raises
     ------
     ValueError
@@ -54,7 +50,7 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
         gap, or which units they have.
     """
     try:
-        from fmpy import extract, read_model_description, supported_platforms
+        from fmpy import extract, platform, read_model_description, supported_platforms
     except ImportError:
         raise ValueError(
             "is an FMU, which is read by the library FMPy: install that with `pip install fingervision[fmu]`."
@@ -68,51 +64,95 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> Callable[[Array, Array
         raise ValueError(f"must be an FMU, but cannot be read as one ({_first_line(error)}).") from error
     if description.fmiVersion[:1] not in "23":
         raise ValueError(f"must be an FMU of FMI 2 or 3, but is of FMI {description.fmiVersion}: export it again.")
-    here = _platform()
-    if here not in platforms:
+    if platform not in platforms:
         there = ", ".join(platforms) or "no system at all"
-        raise ValueError(f"must hold a binary for this system ({here}), but has one for {there}: export it for {here}.")
-    kind = "ModelExchange" if description.modelExchange is not None else "CoSimulation"
-    if description.coSimulation is not None:
-        kind = "CoSimulation"
+        raise ValueError(
+            f"must hold a binary for this system ({platform}), but has one for {there}: export it for {platform}."
+        )
     chosen = _choose(description.modelVariables, "input", names.get("input"), INPUTS)
     outputs = _outputs(description.modelVariables, names)
-    scales = {"input": _mm("input", chosen, names.get("input_unit"))}
-    for name, variable in outputs.items():
-        scales[name] = 1.0 if name == "force_n" else _mm("gap", variable, names.get("gap_unit"))
-    unpacked = extract(str(path))
-
-    def function(time_s: Array, input_mm: Array) -> dict[str, Array]:
-        return _run(unpacked, description, kind, chosen, outputs, scales, time_s, input_mm)
-
-    return function
+    input_mm = _mm("input", chosen, names.get("input_unit"))
+    scales = {
+        name: 1.0 if name == "force_n" else _mm("gap", variable, names.get("gap_unit"))
+        for name, variable in outputs.items()
+    }
+    return Fmu(extract(str(path)), description, chosen, input_mm, outputs, scales)
 
 
-def _run(
-    unpacked: str,
-    description: Any,
-    kind: str,
-    chosen: Any,
-    outputs: Mapping[str, Any],
-    scales: Mapping[str, float],
-    time_s: Array,
-    input_mm: Array,
-) -> dict[str, Array]:
-    """Simulate one run and return its outputs at the run's times."""
-    _drive_between_steps()
-    span_s = float(time_s[-1] - time_s[0])
-    step_s = min(float(np.median(np.diff(time_s))) / FINER, LONGEST_STEP_S)
-    steps = int(np.ceil(min(span_s / step_s, MOST_STEPS)))
+@dataclass(frozen=True, slots=True)
+class Fmu:
+    """An FMU as a function of time.
 
-    def run(steps: int, ahead: float) -> dict[str, Array]:
-        """Simulate with a number of steps, each with the input at a part of the step."""
-        return _stepped(unpacked, description, kind, chosen, outputs, scales, time_s, input_mm, steps, ahead)
+    Parameters
+    ----------
+    unpacked : str
+        Folder with its files.
+    description : ModelDescription
+        Its description, as FMPy reads it.
+    input : ScalarVariable
+        The input.
+    input_mm : float
+        Millimetres per unit of the input.
+    outputs : mapping of str to ScalarVariable
+        The outputs by the names of columns.
+    scales : mapping of str to float
+        Millimetres, or newtons, per unit of each output.
+    """
 
-    if kind != "CoSimulation":
-        return run(steps, 0.0)
-    coarse, fine = run(steps, 0.5), run(2 * steps, 0.5)
-    lag = max(_lag_in_steps(coarse[name], fine[name], time_s, span_s / steps) for name in outputs if name != "force_n")
-    return fine if lag == 0.0 else run(2 * steps, 0.5 + lag)
+    unpacked: str
+    description: Any
+    input: Any
+    input_mm: float
+    outputs: Mapping[str, Any]
+    scales: Mapping[str, float]
+
+    def __call__(self, time_s: Array, input_mm: Array) -> dict[str, Array]:
+        """Simulate one run and return its outputs at the run's times."""
+        _drive_between_steps()
+        span_s = float(time_s[-1] - time_s[0])
+        step_s = min(float(np.median(np.diff(time_s))) / FINER, LONGEST_STEP_S)
+        steps = int(np.ceil(min(span_s / step_s, MOST_STEPS)))
+        if self.description.coSimulation is None:
+            return self._stepped(time_s, input_mm, steps, 0.0)
+        coarse, fine = (self._stepped(time_s, input_mm, count * steps, 0.5) for count in (1, 2))
+        lengths = [name for name in self.outputs if name != "force_n"]
+        lag = max(_lag_in_steps(coarse[name], fine[name], time_s, span_s / steps) for name in lengths)
+        return fine if lag == 0.0 else self._stepped(time_s, input_mm, 2 * steps, 0.5 + lag)
+
+    def _stepped(self, time_s: Array, input_mm: Array, steps: int, ahead: float) -> dict[str, Array]:
+        """Simulate with a number of steps; `ahead` is the part of a step at whose end the input is read."""
+        from fmpy import simulate_fmu
+
+        span_s = float(time_s[-1] - time_s[0])
+        step_s, name = span_s / steps, self.input.name
+        signal = np.empty(time_s.size + 1, dtype=[("time", "f8"), (name, "f8")])
+        signal["time"] = np.concatenate([[-step_s], time_s - time_s[0] - ahead * step_s])
+        signal[name] = np.concatenate([input_mm[:1], input_mm]) / self.input_mm
+        is_stepped = self.description.coSimulation is not None
+        try:
+            found = simulate_fmu(
+                self.unpacked,
+                validate=False,
+                start_time=0.0,
+                stop_time=span_s,
+                output_interval=step_s,
+                step_size=step_s if is_stepped else None,
+                fmi_type="CoSimulation" if is_stepped else "ModelExchange",
+                start_values={name: float(signal[name][0])},
+                input=signal,
+                output=[variable.name for variable in self.outputs.values()],
+                model_description=self.description,
+                remote_platform=None,
+            )
+        except Exception as error:
+            raise ValueError(f"could not be simulated: {_first_line(error)}") from error
+        # At a jump, FMPy states two values for one time; the later one is kept.
+        at_s, kept = np.unique(found["time"][::-1], return_index=True)
+        return {
+            column: np.interp(time_s - time_s[0], at_s, np.asarray(found[variable.name], dtype=np.float64)[::-1][kept])
+            * self.scales[column]
+            for column, variable in self.outputs.items()
+        }
 
 
 def _lag_in_steps(coarse: Array, fine: Array, time_s: Array, step_s: float) -> float:
@@ -129,53 +169,6 @@ def _lag_in_steps(coarse: Array, fine: Array, time_s: Array, step_s: float) -> f
         return 0.0
     lag = -2.0 * float((coarse - fine) @ speed) / (step_s * squares)
     return float(np.clip(lag, 0.0, FOLLOWS_AT_ONCE))
-
-
-def _stepped(
-    unpacked: str,
-    description: Any,
-    kind: str,
-    chosen: Any,
-    outputs: Mapping[str, Any],
-    scales: Mapping[str, float],
-    time_s: Array,
-    input_mm: Array,
-    steps: int,
-    ahead: float,
-) -> dict[str, Array]:
-    """Simulate one run with a number of steps; `ahead` is the part of a step at whose end the input is read."""
-    from fmpy import simulate_fmu
-
-    span_s = float(time_s[-1] - time_s[0])
-    step_s = span_s / steps
-    ahead_s = ahead * step_s
-    signal = np.empty(time_s.size + 1, dtype=[("time", "f8"), (chosen.name, "f8")])
-    signal["time"] = np.concatenate([time_s[:1] - time_s[0] - step_s, time_s - time_s[0] - ahead_s])
-    signal[chosen.name] = np.concatenate([input_mm[:1], input_mm]) / scales["input"]
-    start = {chosen.name: float(input_mm[0]) / scales["input"]}
-    try:
-        found = simulate_fmu(
-            unpacked,
-            validate=False,
-            start_time=0.0,
-            stop_time=span_s,
-            output_interval=step_s,
-            step_size=step_s if kind == "CoSimulation" else None,
-            fmi_type=kind,
-            start_values=start,
-            input=signal,
-            output=[variable.name for variable in outputs.values()],
-            model_description=description,
-            remote_platform=None,
-        )
-    except Exception as error:
-        raise ValueError(f"could not be simulated: {_first_line(error)}") from error
-    at_s, kept = np.unique(found["time"][::-1], return_index=True)
-    out = {}
-    for name, variable in outputs.items():
-        values = np.asarray(found[variable.name], dtype=np.float64)[::-1][kept]
-        out[name] = np.interp(time_s - time_s[0], at_s, values) * scales[name]
-    return out
 
 
 def _drive_between_steps() -> None:
@@ -220,9 +213,8 @@ def _choose(variables: list[Any], causality: str, stated: str | None, usual: tup
                 return one
         raise ValueError(f"must have the variable {stated} (as `{word}` states), but has {_listed(real)}.")
     by_name = {one.name.lower(): one for one in real}
-    for name in usual:
-        if name in by_name:
-            return by_name[name]
+    if (known := next((name for name in usual if name in by_name), None)) is not None:
+        return by_name[known]
     continuous = [one for one in real if one.variability in (None, "continuous")]
     for found in (real, continuous):
         if len(found) == 1:
@@ -255,12 +247,6 @@ def _mm(role: str, variable: Any, stated: str | None) -> float:
             f"must have lengths as input and gap, but {variable.name} is in {unit}: choose another variable."
         )
     return UNITS_MM[unit]
-
-
-def _platform() -> str:
-    from fmpy import platform
-
-    return str(platform)
 
 
 def _first_line(error: Exception) -> str:

@@ -9,8 +9,6 @@ every pair of points on the finger's face.
 from dataclasses import dataclass
 from math import inf
 
-import numpy as np
-
 from fingervision.models.answer_figures import LoadedState
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.mechanism_equilibrium import MechanismEquilibrium
@@ -63,11 +61,7 @@ def gripped(model: DrawnGripper, input_mm: float, part: Part) -> LoadedState:
 
 def first_grip_mm(model: DrawnGripper, part: Part) -> float | None:
     """Input at which a finger first touches the part (mm); None if the fingers do not move towards it."""
-    slope, rest_mm = model.face_per_input, model.elastic.contact_points_mm[0][0]
-    closing = slope > 0.0
-    if not closing.any():
-        return None
-    return float(np.max((0.5 * part.width_mm - rest_mm[closing]) / slope[closing]))
+    return model.reaches_mm(0.5 * part.width_mm)
 
 
 def mechanical_advantage(model: DrawnGripper) -> float | None:

@@ -16,7 +16,7 @@ from fingervision.domain.gripper import Gripper
 from fingervision.domain.made_again import MadeAgain
 from fingervision.domain.response import Response
 from fingervision.models.answer_figures import LoadedState, ModelFigures, PeakStress, Physics
-from fingervision.models.elastic_mechanism import ElasticMechanism, pair_distances_mm
+from fingervision.models.elastic_mechanism import ElasticMechanism
 from fingervision.models.mechanism_equilibrium import MechanismEquilibrium
 from fingervision.models.modal_model import GAP, FreeModes, ModalModel
 
@@ -110,11 +110,15 @@ class DrawnGripper(MadeAgain):
     @cached_property
     def first_touch_mm(self) -> float | None:
         """Input at which the first point of the face meets the symmetry axis (mm); None if none moves towards it."""
+        return self.reaches_mm(0.0)
+
+    def reaches_mm(self, half_gap_mm: float) -> float | None:
+        """Input at which the first point of the face is this far from the symmetry axis (mm); None if none closes."""
         closing = self.face_per_input > 0.0
         if not closing.any():
             return None
-        gap = self.elastic.contact_points_mm[0][0]
-        return float(np.max(-gap[closing] / self.face_per_input[closing]))
+        way_mm = half_gap_mm - self.elastic.contact_points_mm[0][0]
+        return float(np.max(way_mm[closing] / self.face_per_input[closing]))
 
     @cached_property
     def contact_onset_mm(self) -> float | None:
@@ -145,9 +149,7 @@ class DrawnGripper(MadeAgain):
         return LoadedState(input_mm, self._gap_mm(found), found.force_n, grip_n, stress.mpa, stress.place_mm)
 
     def _gap_mm(self, found: MechanismEquilibrium) -> float:
-        large = self.physics.large_rotation
-        probes = self.elastic.probes_mm(found.displacement, large=large)
-        return pair_distances_mm(self.elastic.mechanism, probes, large=large)["gap"]
+        return self.elastic.pairs_mm(found.displacement, large=self.physics.large_rotation)["gap"]
 
     def peak_stress(self) -> PeakStress:
         """Largest stress in the hinges per 1 mm of input, for small displacements."""

@@ -13,7 +13,6 @@ from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ModelError
 from fingervision.domain.response import Response
 from fingervision.models.damping import Damping, ModalDamping
-from fingervision.models.elastic_mechanism import pair_distances_mm
 from fingervision.models.generalized_alpha import integrate
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.modal_model import GAP, Motion, described, modal_motion, run_rows
@@ -116,7 +115,7 @@ class ReducedMotion:
     def _gap_mm(self, reduced: Array) -> float:
         elastic, large = self.model.elastic, self.model.physics.large_rotation
         moved = (self._columns @ reduced)[: None if not large else elastic.driven.unknowns]
-        return pair_distances_mm(elastic.mechanism, elastic.probes_mm(moved, large=large), large=large)["gap"]
+        return elastic.pairs_mm(moved, large=large)["gap"]
 
     @cached_property
     def _penalty_n_mm(self) -> Array:

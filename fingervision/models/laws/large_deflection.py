@@ -11,7 +11,6 @@ from fingervision.domain.effect import History, Values
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.model import PhysicalLaw
 from fingervision.domain.response import Response
-from fingervision.models.elastic_mechanism import pair_distances_mm
 from fingervision.models.small_answer import DrawnAnswer
 
 Array = NDArray[np.float64]
@@ -80,8 +79,7 @@ def _equilibria(drawn: DrawnAnswer) -> tuple[Array, Array, Array]:
     for end_mm, count in ((lowest_mm, _BELOW), (highest_mm, _ABOVE)):
         for value in np.linspace(0.0, end_mm, count + 1)[1:].tolist():
             found = elastic.driven.equilibrium(value, large_rotation=True)
-            probes = elastic.probes_mm(found.displacement, large=True)
-            paths.append((value, pair_distances_mm(elastic.mechanism, probes, large=True)["gap"], found.force_n))
+            paths.append((value, elastic.pairs_mm(found.displacement, large=True)["gap"], found.force_n))
     at, gap, force = np.array(sorted(paths)).T
     inputs = np.linspace(lowest_mm, highest_mm, _ROWS)
     opening_mm = model.gap_per_input * inputs
