@@ -1,8 +1,9 @@
 """Protocol of an actuator: simulated, driven by the Arduino board, turned by hand, or from a plug-in."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
+from fingervision.domain.field import Field
 from fingervision.testbed.force_sensor import Reading
 
 
@@ -32,12 +33,12 @@ class StageLimits:
 
     lower_mm: float
     upper_mm: float
-    speed_mm_s: float
-    force_n: float
-    accuracy_mm: float = 0.0
-    encoder_step_mm: float = 0.0
-    repeatability_mm: float = 0.0
-    settling_s: float = 0.0
+    speed_mm_s: Annotated[float, Field(above=0.0)]
+    force_n: Annotated[float, Field(above=0.0)]
+    accuracy_mm: Annotated[float, Field(low=0.0)] = 0.0
+    encoder_step_mm: Annotated[float, Field(low=0.0)] = 0.0
+    repeatability_mm: Annotated[float, Field(low=0.0)] = 0.0
+    settling_s: Annotated[float, Field(low=0.0)] = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -189,16 +189,10 @@ def read_configuration(name: str) -> Section:
 
 def stated_limits(section: Section) -> SoftLimits:
     """Read the soft limits that a configuration states."""
-    section.only(("lower_mm", "upper_mm", "speed_mm_s", "force_n", "gap_mm"))
-    big = float("inf")
-    lower_mm = section.number("lower_mm") if "lower_mm" in section.values else -big
-    return SoftLimits(
-        lower_mm=lower_mm,
-        upper_mm=section.number("upper_mm", above=lower_mm) if "upper_mm" in section.values else big,
-        speed_mm_s=section.number("speed_mm_s", above=0.0) if "speed_mm_s" in section.values else big,
-        force_n=section.number("force_n", above=0.0) if "force_n" in section.values else big,
-        gap_mm=section.number("gap_mm", 0.0, low=0.0),
-    )
+    limits = section.record(SoftLimits)
+    if "upper_mm" in section.values:
+        section.number("upper_mm", above=limits.lower_mm)
+    return limits
 
 
 def limits_within(limits: SoftLimits, able: StageLimits, section: Section) -> SoftLimits:

@@ -5,15 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.domain.errors import DeviceError, LimitError, StateError
+from fingervision.domain.field import names_of
 from fingervision.domain.step_data import Coordinates, StepData
 from fingervision.storage.board_toml import read_board
 from fingervision.storage.recipe_toml import read_steps
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
-from fingervision.testbed.board import motions, wire
+from fingervision.testbed.board import wire
 from fingervision.testbed.board.board import KEY, Board, board_of
 from fingervision.testbed.board.link import fingervision_at
-from fingervision.testbed.board.motions import Codes, Motions, Run, Waits, codes_of, waits_of
+from fingervision.testbed.board.motions import Controller, Motions, Run, controller_of
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import Reading
@@ -21,7 +22,7 @@ from fingervision.testbed.motion.move_limits import PUBLISHED, PUBLISHED_KEYS, c
 from fingervision.testbed.motion.step_checks import jog_step, planned, route
 
 SIMULATED = False
-KEYS = (KEY, "steps", *PUBLISHED_KEYS, *motions.KEYS)
+KEYS = (KEY, "steps", *PUBLISHED_KEYS, *names_of(Controller))
 # A motion counts as stuck if it takes longer than PATIENCE times the duration of its profile, plus PATIENCE_S.
 PATIENCE, PATIENCE_S = 1.5, 1.0
 READ_EVERY_S = 0.005
@@ -64,22 +65,18 @@ class BoardActuator:
         Step data stored in the controller: the same data as were loaded into the controller by its maker's tool.
     limits : StageLimits
         Limits of the stage.
-    codes : Codes
-        Codes of the steps on the select lines.
-    waits : Waits
-        Time limits for the controller's signals.
+    controller : Controller
+        Codes of the steps on the select lines, and response times.
     clock : Clock
         Clock of the test bed.
     """
 
     has_steps = True
 
-    def __init__(
-        self, board: Board, data: StepData, limits: StageLimits, codes: Codes, waits: Waits, clock: Clock
-    ) -> None:
+    def __init__(self, board: Board, data: StepData, limits: StageLimits, controller: Controller, clock: Clock) -> None:
         self.limits = limits
-        self._board, self._data, self._codes, self._waits, self._clock = board, data, codes, waits, clock
-        self._motions = Motions(board, waits, clock, data.start_mm)
+        self._board, self._data, self._controller, self._clock = board, data, controller, clock
+        self._motions = Motions(board, controller, clock, data.start_mm)
         self._read_s = clock.now_s()
         self._closed = False
 
@@ -114,8 +111,8 @@ class BoardActuator:
                 "the controller."
             )
         self._motions.failure = None
-        if self._codes.home is not None:
-            self._motions.begin([Run(self._codes.home, self._waits.home_s, None)])
+        if self._controller.home_code is not None:
+            self._motions.begin([Run(self._controller.home_code, self._controller.home_within_s, None)])
             return
         for number, step in self._data.steps.items():
             if step.coordinates is Coordinates.ABSOLUTE and step.target_mm == 0.0:
@@ -220,8 +217,12 @@ class BoardActuator:
     def _run_of(self, number: int, at_mm: float) -> Run:
         motion = planned(number, self._data.steps[number], at_mm, self.limits)
         # From an unknown position, the motion may take as long as homing.
-        at_most_s = PATIENCE * motion.motion.seconds + PATIENCE_S + (0.0 if self._motions.known else self._waits.home_s)
-        return Run(self._codes.first + number - 1, at_most_s, motion)
+        at_most_s = (
+            PATIENCE * motion.motion.seconds
+            + PATIENCE_S
+            + (0.0 if self._motions.known else self._controller.home_within_s)
+        )
+        return Run(self._controller.first_code + number - 1, at_most_s, motion)
 
 
 def holder(section: Section, folder: Path) -> int | None:
@@ -237,9 +238,9 @@ def without_hardware(section: Section, folder: Path) -> Routes:
 def build(section: Section, context: BuildContext) -> BoardActuator:
     """Build the actuator from its section of the configuration."""
     data = read_steps(context.folder / section.word("steps"))
-    codes, waits = codes_of(section, data), waits_of(section)
+    controller = controller_of(section, data)
     board = board_of(section, context)
     if not board.settings.moves:
         board.close()
         section.refuse(KEY, "must have a motor controller on its lines, but has a force sensor only: add its lines.")
-    return BoardActuator(board, data, stage_limits(section, PUBLISHED), codes, waits, context.clock)
+    return BoardActuator(board, data, stage_limits(section, PUBLISHED), controller, context.clock)

@@ -3,11 +3,13 @@
 import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Event, Thread
+from typing import Annotated
 
 from fingervision.domain.board_settings import Role
 from fingervision.domain.errors import DeviceError, FingervisionError
+from fingervision.domain.field import Field
 from fingervision.domain.step_data import Coordinates, StepData
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.board import wire
@@ -16,66 +18,44 @@ from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.motion.motion_profile import CommandedPath, MotionProfile
 from fingervision.testbed.motion.step_checks import PlannedMotion
 
-KEYS = ("first_code", "home_code", "home_within_s", "busy_within_s", "enable_s")
-HIGHEST_CODE = 15
-HOME_WITHIN_S, BUSY_WITHIN_S, ENABLE_S, LONGEST_S = 10.0, 0.5, 0.5, 60.0
+HIGHEST_CODE, LONGEST_S = 15, 60.0
+Code = Field(low=0.0, high=HIGHEST_CODE)
 
 
 @dataclass(frozen=True, slots=True)
-class Codes:
-    """Codes on the select lines by which the steps of the controller are selected.
+class Controller:
+    """How a motor controller differs from others: its codes on the select lines, and its response times.
 
     Parameters
     ----------
-    first : int
+    first_code : int
         Code of step 1; the codes of the other steps follow in order.
-    home : int or None
+    home_code : int or None
         Code for the return to the reference, if the controller has one.
-    """
-
-    first: int
-    home: int | None
-
-
-@dataclass(frozen=True, slots=True)
-class Waits:
-    """Time limits for the controller's signals.
-
-    Parameters
-    ----------
-    home_s : float
+    home_within_s : float
         Time for the return to the reference.
-    busy_s : float
+    busy_within_s : float
         Time from the drive line to the busy line.
     enable_s : float
         Time from the enable line to readiness; 0 without an enable line.
     """
 
-    home_s: float
-    busy_s: float
-    enable_s: float
+    first_code: Annotated[int, Code] = 1
+    home_code: Annotated[int | None, Code] = None
+    home_within_s: Annotated[float, Field(above=0.0, high=LONGEST_S)] = 10.0
+    busy_within_s: Annotated[float, Field(above=0.0, high=LONGEST_S)] = 0.5
+    enable_s: Annotated[float, Field(low=0.0, high=LONGEST_S)] = 0.5
 
 
-def codes_of(section: Section, data: StepData) -> Codes:
-    """Read the codes, which must address all steps by four lines."""
-    first = section.whole("first_code", 1, low=0, high=HIGHEST_CODE)
-    if first + max(data.steps) - 1 > HIGHEST_CODE:
+def controller_of(section: Section, data: StepData) -> Controller:
+    """Read the controller's settings, by which all steps must have a code on four lines."""
+    controller = replace(section, is_open=True).record(Controller)
+    if (first := controller.first_code) + max(data.steps) - 1 > HIGHEST_CODE:
         section.refuse(
             "first_code",
             f"must leave codes for step {max(data.steps)} on four lines (at most {HIGHEST_CODE}), but is {first}.",
         )
-    if "home_code" not in section.values:
-        return Codes(first, None)
-    return Codes(first, section.whole("home_code", low=0, high=HIGHEST_CODE))
-
-
-def waits_of(section: Section) -> Waits:
-    """Read the time limits."""
-    return Waits(
-        section.number("home_within_s", HOME_WITHIN_S, above=0.0, high=LONGEST_S),
-        section.number("busy_within_s", BUSY_WITHIN_S, above=0.0, high=LONGEST_S),
-        section.number("enable_s", ENABLE_S, low=0.0, high=LONGEST_S),
-    )
+    return controller
 
 
 # One motion by parallel lines: select, settle, drive, busy, not busy; each phase has its own time limit.
@@ -204,7 +184,7 @@ class Motions:
     ----------
     board : Board
         The board, after its set-up.
-    waits : Waits
+    controller : Controller
         Time limits for the controller's signals.
     clock : Clock
         Clock of the test bed.
@@ -212,16 +192,16 @@ class Motions:
         Assumed position of the stage at the start.
     """
 
-    def __init__(self, board: Board, waits: Waits, clock: Clock, start_mm: float) -> None:
+    def __init__(self, board: Board, controller: Controller, clock: Clock, start_mm: float) -> None:
         self.path = CommandedPath(start_mm)
         # After a start or a stop, the position is known only after an absolute step or homing.
         self.known = False
         self.failure: str | None = None
-        self._board, self._waits, self._clock = board, waits, clock
+        self._board, self._controller, self._clock = board, controller, clock
         self._worker: Thread | None = None
         self._stopped = Event()
         self._ready_s = clock.now_s()
-        self._handshake = Handshake(board, clock, waits.busy_s, self._stopped)
+        self._handshake = Handshake(board, clock, controller.busy_within_s, self._stopped)
 
     @property
     def busy(self) -> bool:
@@ -244,7 +224,7 @@ class Motions:
         self._board.wait_for_stop()
         if not self._board.ready:
             self._board.clear()
-            self._ready_s = self._clock.now_s() + self._waits.enable_s
+            self._ready_s = self._clock.now_s() + self._controller.enable_s
         self._worker = Thread(target=self._work, args=(runs,), name="motion", daemon=True)
         self._worker.start()
 

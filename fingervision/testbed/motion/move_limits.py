@@ -1,12 +1,14 @@
 """Limits of a stage and of recipes (soft limits): what a configuration states, and what a motion must keep."""
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import inf
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import LimitError
+from fingervision.domain.field import Field, names_of
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import StageLimits
 
@@ -71,9 +73,7 @@ class FreeMoves:
         )
 
 
-LIMIT_KEYS = (
-    "lower_mm", "upper_mm", "speed_mm_s", "force_n", "accuracy_mm", "encoder_step_mm", "repeatability_mm", "settling_s",
-)  # fmt: skip
+LIMIT_KEYS = names_of(StageLimits)
 ENDLESS_N = 1e9
 """Value used for a force limit that is not stated."""
 
@@ -83,22 +83,11 @@ def stage_limits(section: Section, default: StageLimits | None = None) -> StageL
 
     Without defaults, the range and the speed must be stated, the force is unlimited, and the stage is exact.
     """
-
-    def number(key: str, otherwise: float | None = None, above: float | None = None) -> float:
-        low = 0.0 if above is None else -inf
-        return section.number(key, otherwise if default is None else getattr(default, key), low=low, above=above)
-
-    lower_mm = section.number("lower_mm", None if default is None else default.lower_mm)
-    return StageLimits(
-        lower_mm=lower_mm,
-        upper_mm=number("upper_mm", above=lower_mm),
-        speed_mm_s=number("speed_mm_s", above=0.0),
-        force_n=number("force_n", ENDLESS_N, above=0.0),
-        accuracy_mm=number("accuracy_mm", 0.0),
-        encoder_step_mm=number("encoder_step_mm", 0.0),
-        repeatability_mm=number("repeatability_mm", 0.0),
-        settling_s=number("settling_s", 0.0),
-    )
+    given = {"force_n": ENDLESS_N} if default is None else asdict(default)
+    stated = replace(section, values={**given, **section.values}, is_open=True)
+    limits = stated.record(StageLimits)
+    stated.number("upper_mm", above=limits.lower_mm)
+    return limits
 
 
 # Hricko and Havlik (2015), section 3: stroke 10 mm, 400 mm/s, positioning accuracy +-90 um, 5.5 N.
@@ -128,11 +117,11 @@ class SoftLimits:
         Smallest gap while the stage closes; below it the stage stops.
     """
 
-    lower_mm: float
-    upper_mm: float
-    speed_mm_s: float
-    force_n: float
-    gap_mm: float = 0.0
+    lower_mm: float = -inf
+    upper_mm: float = inf
+    speed_mm_s: Annotated[float, Field(above=0.0)] = inf
+    force_n: Annotated[float, Field(above=0.0)] = inf
+    gap_mm: Annotated[float, Field(low=0.0)] = 0.0
 
     @property
     def tabulated_mm(self) -> NDArray[np.float64]:
