@@ -133,6 +133,11 @@ class Lever:
     drive_face_y_mm: Annotated[float, _place("height of the face on which the actuator pushes")]
     drive_face_half_width_mm: Annotated[float, _length("half width of that face")]
 
+    @property
+    def hinges(self) -> tuple[tuple[PointMm, float], ...]:
+        """Places of hinges 1 and 2 (mm), and directions of their axes (degrees)."""
+        return (self.hinge1_mm, self.hinge1_axis_deg), (self.hinge2_mm, self.hinge2_axis_deg)
+
 
 @dataclass(frozen=True, slots=True)
 class Links:

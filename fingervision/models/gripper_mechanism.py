@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from math import atan2, cos, degrees, hypot, radians, sin
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -125,12 +125,11 @@ def right_of_axis(corners: tuple[PointMm, ...]) -> tuple[PointMm, ...]:
 
 
 def _flexures(gripper: Gripper, side: float, prefix: str) -> tuple[Flexure, ...]:
-    hinge, lever = gripper.hinge, gripper.lever
-    places = ((lever.hinge1_mm, lever.hinge1_axis_deg), (lever.hinge2_mm, lever.hinge2_axis_deg))
+    hinge = gripper.hinge
     return tuple(
         Flexure(f"{prefix}hinge {number}", "circular", (side * x, y), axis_deg if side > 0.0 else 180.0 - axis_deg,
                 hinge.thickness_mm, hinge.radius_mm, hinge.radius_mm)
-        for number, ((x, y), axis_deg) in enumerate(places, 1)
+        for number, ((x, y), axis_deg) in enumerate(gripper.lever.hinges, 1)
     )  # fmt: skip
 
 
@@ -153,10 +152,10 @@ computation."""
 
 def notch_centres_mm(gripper: Gripper) -> tuple[PointMm, ...]:
     """Centres of the four discs that cut the two hinges: radius + thickness / 2 on either side of each hinge's axis."""
-    hinge, lever = gripper.hinge, gripper.lever
+    hinge = gripper.hinge
     offset_mm = hinge.radius_mm + hinge.thickness_mm / 2.0
     centres: list[PointMm] = []
-    for (x_mm, y_mm), axis_deg in ((lever.hinge1_mm, lever.hinge1_axis_deg), (lever.hinge2_mm, lever.hinge2_axis_deg)):
+    for (x_mm, y_mm), axis_deg in gripper.lever.hinges:
         across = (-sin(radians(axis_deg)), cos(radians(axis_deg)))
         centres += [(x_mm + side * offset_mm * across[0], y_mm + side * offset_mm * across[1]) for side in (-1, 1)]
     return tuple(centres)
@@ -186,23 +185,33 @@ def check_outline(gripper: Gripper, origin: str = "the drawing") -> None:
             f"The right half in {origin} must be one body, but the links and notches leave {outer} pieces; "
             "check that the links overlap and that no notch cuts through one of them."
         )
-    for number in (1, 2):
-        _check_hinge(gripper, number, origin)
+    apart, links = _ON * gripper.body.height_mm, gripper.links
+    x0, x1, y0, _ = links.pillar_and_root_mm
+    (xa, ya), (xb, yb) = links.shuttle_from_mm, links.shuttle_to_mm
+    from_clamp = _HingeEnd("clamp", (0.5 * (x0 + x1), y0 + apart), 90.0)
+    from_drive = _HingeEnd("drive", (apart, gripper.lever.drive_mm[1]), degrees(atan2(yb - ya, xb - xa)))
+    for number, end in enumerate((from_clamp, from_drive), 1):
+        _check_hinge(gripper, region, number, end, origin)
     _check_faces(gripper, region, origin)
 
 
-def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
-    region, hinge, links = half_region(gripper), gripper.hinge, gripper.links
-    (xa, ya), (xb, yb) = links.shuttle_from_mm, links.shuttle_to_mm
-    link_deg = 90.0 if number == 1 else degrees(atan2(yb - ya, xb - xa))
-    axis_deg = gripper.lever.hinge1_axis_deg if number == 1 else gripper.lever.hinge2_axis_deg
+class _HingeEnd(NamedTuple):
+    """What a hinge joins to the tip: its name, a point on it, and the direction of the hinge's link."""
+
+    name: str
+    point_mm: PointMm
+    link_deg: float
+
+
+def _check_hinge(gripper: Gripper, region: PlanarRegion, number: int, end: _HingeEnd, origin: str) -> None:
+    hinge, link_deg = gripper.hinge, end.link_deg
+    (x, y), axis_deg = gripper.lever.hinges[number - 1]
     askew_deg = abs((axis_deg - link_deg + 90.0) % 180.0 - 90.0)
     if askew_deg > _ASKEW_DEG:
         raise DataError(
             f"lever.hinge{number}_axis_deg in {origin} must be within {_ASKEW_DEG:g} degrees of the direction of "
             f"its link, {link_deg:.4g} degrees, but is {axis_deg:g}."
         )
-    x, y = gripper.lever.hinge1_mm if number == 1 else gripper.lever.hinge2_mm
     if not region.holds(np.array([[x], [y]]))[0]:
         raise DataError(
             f"lever.hinge{number}_mm in {origin} must lie inside its link, but there is no material at "
@@ -222,16 +231,12 @@ def _check_hinge(gripper: Gripper, number: int, origin: str) -> None:
     (xa, ya), (xb, yb) = centres
     saw = bar(xa, ya, xb, yb, _SLIT * hinge.thickness_mm)
     pieces = [loop for loop in PlanarRegion((*region.steps, (False, saw))).loops if loop.area_mm2 > 0.0]
-    apart = _ON * gripper.body.height_mm
-    x0, x1, y0, _ = links.pillar_and_root_mm
-    foot = (0.5 * (x0 + x1), y0 + apart) if number == 1 else (apart, gripper.lever.drive_mm[1])
-    tip = (gripper.tip_corner_mm[0] + apart, gripper.measuring_point_mm[1])
-    parted = any(piece.holds(np.array([foot, tip]).T).tolist() == [True, False] for piece in pieces)
+    tip = (gripper.tip_corner_mm[0] + _ON * gripper.body.height_mm, gripper.measuring_point_mm[1])
+    parted = any(piece.holds(np.array([end.point_mm, tip]).T).tolist() == [True, False] for piece in pieces)
     if len(pieces) != 2 or not parted:
-        end = "clamp" if number == 1 else "drive"
         raise DataError(
-            f"Hinge {number} in {origin} must be the only connection from the {end} to the tip, but other material "
-            f"beside the neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm connects them too; check "
+            f"Hinge {number} in {origin} must be the only connection from the {end.name} to the tip, but other "
+            f"material beside the neck of {hinge.thickness_mm:g} mm at ({x:g}, {y:g}) mm connects them too; check "
             f"lever.hinge{number}_mm, lever.hinge{number}_axis_deg and hinge.radius_mm against the link that it cuts."
         )
 

@@ -6,12 +6,12 @@ import shutil
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from calib.measured_scale import Calibration
 from fingervision import __version__
@@ -78,8 +78,7 @@ def about_run(recipe: Recipe[Section], bed: Bed, hidden: Hidden, began_at: datet
     }
 
 
-@dataclass(frozen=True, slots=True)
-class Remains:
+class Remains(NamedTuple):
     """An interrupted run: its rows and events so far, from which it may be continued.
 
     Parameters
@@ -220,9 +219,7 @@ class BedRunFolder:
         try:
             earlier = remains(path, recipe, digest_of(bed, hidden))
             self.resumed = earlier is not None
-            self.rows: list[SampleRow] = earlier.rows if earlier else []
-            self.events_done = earlier.events if earlier else []
-            self.began_at = earlier.began_at if earlier else datetime.now(UTC)
+            self.began_at, self.rows, self.events_done = earlier or Remains(datetime.now(UTC), [], [])
             self._about = about_run(recipe, bed, hidden, self.began_at)
             self._files = RunFiles(path)
             self._files.write_about(self._about, complete=False)
