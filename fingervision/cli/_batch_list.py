@@ -297,6 +297,3 @@ def _stated(option: click.Option, value: Any) -> Any:
     except click.UsageError as error:
         raise UsageError(f"{option.opts[0]} is not understood: {error.format_message()}") from None
     return tuple(converted) if option.multiple else converted[0]
-
-
-__all__ = ["diagnose", "measure"]

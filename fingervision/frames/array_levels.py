@@ -165,6 +165,3 @@ def what_it_is(value: object) -> str:
     if isinstance(value, list | tuple | dict | set):
         return f"{article} {name} of {len(value)}"
     return f"{article} {name}"
-
-
-__all__ = ["levels_of", "stated_shape", "what_it_is"]

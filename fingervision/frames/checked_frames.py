@@ -209,6 +209,3 @@ class CheckedFrames:
     @property
     def _is_live(self) -> bool:
         return hasattr(self.source, "received")
-
-
-__all__ = ["CheckedFrames", "description_faults", "held", "of_argument"]

@@ -197,17 +197,3 @@ def region_of(roi: object) -> tuple[int, int, int, int] | None:
         raise UsageError(f"--roi must be four whole numbers X,Y,W,H in pixels, but is {roi!r}.")
     x_px, y_px, width_px, height_px = (whole_number("roi", each, 0) for each in roi)
     return x_px, y_px, width_px, height_px
-
-
-__all__ = [
-    "command_words",
-    "in_command",
-    "in_python",
-    "number",
-    "one_of",
-    "path_of",
-    "python_words",
-    "region_of",
-    "speaks_python",
-    "whole_number",
-]

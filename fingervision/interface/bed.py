@@ -188,6 +188,3 @@ def bed(
 
 def _recipe_of(recipe: Any) -> Recipe[Section]:
     return recipe if isinstance(recipe, Recipe) else read_recipe(path_of("recipe", recipe, "a recipe.toml"))
-
-
-__all__ = ["OpenBed", "bed"]

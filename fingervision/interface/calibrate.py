@@ -328,6 +328,3 @@ def _only(pictures: Sequence[Any]) -> Any:
     if len(pictures) != 1:
         raise ArgumentError("pictures", "be one picture of a line scale", f"are {len(pictures)}")
     return pictures[0]
-
-
-__all__ = ["KINDS", "LENS_LEFT", "Noted", "calibrate", "limits_from", "on_board", "on_lines", "on_sizes"]

@@ -344,6 +344,3 @@ class Calibration:
 
         first = next(iter(self.pictures.values()), None)
         return f"<pre>{escape(self.report())}</pre>{'' if first is None else image_html(png_of(first))}"
-
-
-__all__ = ["Calibration", "as_json"]

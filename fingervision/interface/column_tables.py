@@ -125,6 +125,3 @@ def _numbers(argument: str, name: str, cells: list[Any]) -> Numbers:
 def _is_missing(cell: Any) -> bool:
     """Whether a cell is empty: None, pandas' NA, or NaN, which represents a missing value in a DataFrame."""
     return cell is None or type(cell).__name__ in ("NAType", "NaTType") or (isinstance(cell, float) and cell != cell)
-
-
-__all__ = ["columns_of", "drive_from_columns", "measured_from_columns", "simulation_from_columns"]

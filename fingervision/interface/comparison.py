@@ -223,6 +223,3 @@ def compare(
     made = provenance(files, call)
     found = {name: compare_one(table.value, given.value, seed=seed) for name, given in models.items()}
     return Comparison(found, table.path, made)
-
-
-__all__ = ["Comparison", "compare"]

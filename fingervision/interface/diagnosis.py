@@ -240,6 +240,3 @@ def diagnose(
             told: dict[str, Any] = {} if show is None else {"progress": show}
             found = diagnose_table(table.value, given.value, seed=seed, forced=forced, without=without, **told)
     return Diagnosis(found, given.value, table.path, made, own)
-
-
-__all__ = ["Diagnosis", "diagnose"]

@@ -332,6 +332,3 @@ def example(name: str, folder: "str | os.PathLike[str] | None" = None) -> Path:
     path = Path(f"example-{name}") if folder is None else path_of("folder", folder, "a folder")
     copy_example(name, path)
     return path
-
-
-__all__ = ["CASES", "Case", "board_pictures", "copy_example", "example", "exposures", "micrometer", "step_wedge"]

@@ -135,6 +135,3 @@ def _camera(source: Any, frames: int | None) -> Opener:
     finally:
         source.close()
     return _Same(kept)
-
-
-__all__ = ["Opener", "recording_of"]

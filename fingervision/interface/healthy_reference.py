@@ -97,6 +97,3 @@ def changes_since(
     outlines = flexures_beside(tables[1].path), flexures_beside(tables[0].path)
     found = compare_with_healthy(tables[0].value, tables[1].value, given.value, outlines)
     return Changes(found, tables[0].path, provenance(files, call))
-
-
-__all__ = ["CHANGES", "Changes", "changes_since"]

@@ -172,6 +172,3 @@ def inspect(
             opened.close()
     notes = tuple(words for words in (*description.notes, warning) if words)
     return Inspection(tuple(findings_of(sample)), notes, sample)
-
-
-__all__ = ["Inspection", "inspect"]

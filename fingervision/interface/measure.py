@@ -203,6 +203,3 @@ def _own_scale(source: Any) -> float:
     from fingervision.frames.simulated import PX_PER_MM
 
     return PX_PER_MM if isinstance(source, str) else float(source.px_per_mm)
-
-
-__all__ = ["measure", "measure_into"]

@@ -296,6 +296,3 @@ class Measurement:
         out = path_of("folder", folder, "a folder")
         steps_frame = None if steps is None else whole_number("steps", steps, 0)
         return save_measured(self._found, self._again(), out, overlay=overlay, steps_frame=steps_frame).path
-
-
-__all__ = ["Measurement"]

@@ -69,6 +69,3 @@ def cell_html(found: MeasuredInMemory, again: Opener) -> str:
     if found.first_frame is None:
         return line
     return line + image_html(png_of(marked_picture(found, again, found.rows[0].frame)))
-
-
-__all__ = ["cell_html", "marked_picture", "plotted"]

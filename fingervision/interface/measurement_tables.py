@@ -113,6 +113,3 @@ def dataset(found: MeasuredInMemory) -> "xr.Dataset":
 def _cell(row: GapRow, name: str) -> Any:
     value = getattr(row, name)
     return value.value if isinstance(value, Status) else value
-
-
-__all__ = ["columns_of", "dataframe", "dataset", "measured_table"]

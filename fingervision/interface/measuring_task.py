@@ -179,6 +179,3 @@ def _log(drive: Any, columns: Path | None) -> DriveHistory:
     from fingervision.interface.column_tables import drive_from_columns
 
     return drive_from_columns(drive)
-
-
-__all__ = ["measuring_task", "range_of", "scale_of"]

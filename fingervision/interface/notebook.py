@@ -71,6 +71,3 @@ def save_results(measured: Path, folder: "str | os.PathLike[str]", write: Callab
 def cell_html(results: Drawn, words: str) -> str:
     """Return the HTML of a notebook cell: a text and the figure of the residuals."""
     return f"<pre>{escape(words)}</pre>{image_html(png_of_figure(results.figure()))}"
-
-
-__all__ = ["Drawn", "cell_html", "image_html", "png_of", "png_of_figure", "save_results"]

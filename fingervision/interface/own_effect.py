@@ -155,6 +155,3 @@ def _sentences(function: Callable[..., Any]) -> tuple[str, str]:
         )
     formula = " ".join(rest.split()) or f"{function.__name__}(signal, history, values)"
     return words[0].lower() + words[1:], formula
-
-
-__all__ = ["added", "effect"]

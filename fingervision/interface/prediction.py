@@ -462,9 +462,3 @@ def figures_text(name: str, figures: Mapping[str, Figures], *, digits: int = 5, 
         cells = ("-" if (x := row.get(label)) is None else f"{x:.{digits}g}" for row in figures.values())
         lines.append(f"{words:<{width}}" + "".join(f"{cell:>18}" for cell in cells))
     return "\n".join(lines)
-
-
-__all__ = [
-    "ALL", "GripperPrediction", "MechanismPrediction", "Prediction", "figures_csv", "figures_text", "model", "naming",
-    "predict_gripper", "predict_mechanism",
-]  # fmt: skip

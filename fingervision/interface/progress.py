@@ -56,6 +56,3 @@ def shown(progress: Bar | bool | None, words: str, unit: str = "") -> Iterator[B
             bar.update(max(0.0, done - bar.n))
 
         yield show
-
-
-__all__ = ["Bar", "shown"]

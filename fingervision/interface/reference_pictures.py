@@ -161,6 +161,3 @@ def _first_frame(path: Path) -> Pixels:
         if isinstance(frame, Frame):
             return frame.pixels
     raise DataError(f"The video {path} must have a frame that can be decoded, but has none: record it again.")
-
-
-__all__ = ["KINDS", "Reference", "files_of", "known_sizes", "read_pictures", "references_of"]

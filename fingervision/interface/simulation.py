@@ -308,6 +308,3 @@ def _runs(run: tuple[str, ...] | None, count: int) -> tuple[slice, ...]:
         return (slice(0, count),)
     borders = [0, *(at for at in range(1, count) if run[at] != run[at - 1]), count]
     return tuple(slice(a, b) for a, b in pairwise(borders))
-
-
-__all__ = ["Simulation", "inputs_given", "simulate"]

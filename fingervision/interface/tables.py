@@ -300,9 +300,3 @@ def _name_of(what: str, *columns: Any) -> Path:
     for column in columns:
         whole.update(np.ascontiguousarray(column).tobytes())
     return IN_MEMORY / f"{what}-{whole.hexdigest()[:12]}"
-
-
-__all__ = [
-    "Given", "effect_names", "measured_given", "model_given", "models_given", "own_base", "read_model", "read_table",
-    "told_apart",
-]  # fmt: skip

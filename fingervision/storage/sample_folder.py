@@ -23,6 +23,3 @@ def sample_folder() -> Path:
     raise InstallationError(
         f"The samples must lie in {package / NAME}, but are not there: install fingervision again from its wheel."
     )
-
-
-__all__ = ["sample_folder"]
