@@ -27,7 +27,6 @@ from fingervision.vision.profile_lines import INNER, PLACES, ROWS
 from fingervision.vision.residuals import (
     SHARED_POINTS,
     corner_aside_px,
-    has_flanks,
     set_aside_variance,
     shape_holds,
     shared_points,
@@ -129,7 +128,7 @@ def measure_gap(
         fitted = with_corner_doubt(list(points), [left, right], fitted, below_tip_px, rough.shared_px)
     stray = 1.0 if rough is None else rough.shared_px
     holds = [shape_holds(*one, below_tip_px, stray) for one in zip(points, (left, right), fitted, strict=True)]
-    refusal = _no_fingers(fingers, points, (left, right), holds, below_tip_px)
+    refusal = _no_fingers(fingers, (left, right), below_tip_px)
     if refusal is not None:
         return refusal
     held = None
@@ -320,21 +319,11 @@ def _way_px(edges: EdgePoints) -> float:
     return sqrt(12.0 * max(0.0, float((flanks - tips).max())))
 
 
-def _no_fingers(
-    fingers: CoarseFingers,
-    points: tuple[OutlinePoints, OutlinePoints],
-    ends: tuple[FingerEnd, FingerEnd],
-    holds: list[bool],
-    below_tip_px: float,
-) -> NoGap | None:
+def _no_fingers(fingers: CoarseFingers, ends: tuple[FingerEnd, FingerEnd], below_tip_px: float) -> NoGap | None:
     """Return the status `no_fingers` or `one_finger` if an object has no straight flanks, as fingers have."""
     pair = (fingers.left, fingers.right)
     turn = common_turn([finger.inner_sign * end.parameters[OUTER_M] for finger, end in zip(pair, ends, strict=True)])
-    are_fingers = [
-        (does_hold and has_flanks(p, end, finger.inner_sign * turn))
-        or has_straight_flanks(finger.top, below_tip_px, STEEPEST + abs(turn))
-        for finger, p, end, does_hold in zip(pair, points, ends, holds, strict=True)
-    ]
+    are_fingers = [has_straight_flanks(finger.top, below_tip_px, STEEPEST + abs(turn)) for finger in pair]
     if abs(turn) > FARTHEST_TURNED and any(are_fingers):
         return NoGap(
             Status.NO_FINGERS,

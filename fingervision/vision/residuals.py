@@ -6,8 +6,7 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.loops import loop
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import INNER_M, INNER_R, OUTER_M, PARAMETERS, on_flanks
-from fingervision.vision.flanks import STEEPEST
+from fingervision.vision.finger_shape import INNER_R, PARAMETERS
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
 
@@ -25,8 +24,6 @@ BIWEIGHT_SPREAD = 0.828
 # Largest mean residual near the measuring point and near the tip, in its standard uncertainties, at which the
 # three-sided shape is accepted; largest misfit.
 SHAPE_LIMIT, MISFIT_LIMIT = 3.5, 2.5
-# Least share of straight flanks in a fitted outline; a round object has almost none.
-FLANKS_SHARE = 0.05
 # Distance (pixels) from a point within which residuals are used to test the shape, and least number of points.
 SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
 # Share of rejected points near the measuring point above which they are not dust but the finger's shape; weight below
@@ -129,25 +126,6 @@ def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint
     if np.count_nonzero(is_aside) < FEWEST_OF_CORNER or end.parameters[INNER_R] < FILLET_SHARE * below_tip_px:
         return 0.0
     return float(np.max(np.abs(end.residual * points.u)[is_aside]))
-
-
-def has_flanks(points: OutlinePoints, end: FingerEnd, turn: float = 0.0) -> bool:
-    """Whether enough of the fitted outline belongs to flanks that are nearly parallel to the finger's axis.
-
-    Parameters
-    ----------
-    points : OutlinePoints
-        Sub-pixel outline of the finger.
-    end : FingerEnd
-        Shape fitted to the outline.
-    turn : float
-        Common tilt of both fingers, due to a turned camera, in this finger's own axes.
-    """
-    if max(abs(end.parameters[INNER_M] - turn), abs(end.parameters[OUTER_M] - turn)) > STEEPEST:
-        return False
-    seen = end.robust > 0.0
-    is_on = on_flanks(end.parameters, end.origin, points.x, points.y)
-    return bool(np.count_nonzero(is_on & seen) > FLANKS_SHARE * np.count_nonzero(seen))
 
 
 def is_on_outline(points: OutlinePoints, edge: float, height: float) -> bool:
