@@ -11,7 +11,6 @@ from calib.edge_profile import EdgeProfile
 from calib.edge_response import ResponsePosterior, fit_families, probabilities
 from calib.tone_curves import family
 from fingervision.domain.camera import (
-    BesideEdges,
     CameraModel,
     CameraQuantity,
     Origin,
@@ -27,9 +26,9 @@ from fingervision.vision.learnt_scene import (
     STEPS,
     SURE,
     FlankSight,
-    beside_edges,
     less_sure,
     overshoot,
+    told_beside,
     u_of_rivals_px,
     with_structure,
 )
@@ -127,23 +126,9 @@ def learnt_from_profiles(
     if not every or sight is None:
         return camera
     if camera.response.curve is assumed:
-        same = [fit for fit in every if fit.family.name == assumed.name]
-        if any(fit.scene.name for fit in same):
-            told = sum(float(p) for p, fit in zip(probabilities(every), every, strict=True) if fit.scene.name)
-            camera = replace(camera, beside=_if_told(beside_edges(same, sight.profiles), told))
+        camera = replace(camera, beside=told_beside(every, assumed.name, sight.profiles))
     u_px = u_of_rivals_px(every, probabilities(every), sight.profiles, camera.response.curve.name)
     return replace(camera, beside=less_sure(camera.beside, u_px))
-
-
-def _if_told(beside: BesideEdges | None, told: float) -> BesideEdges | None:
-    """What stands beside the edges if that is more probable than plain edges behind any tone curve.
-
-    Otherwise plain edges stay where they are, and what would displace them is in their uncertainty.
-    """
-    if beside is None or told > 0.5:
-        return beside
-    u_px = float(np.hypot(beside.u_gap_px, sum(beside.inner_px)))
-    return less_sure(None, u_px)
 
 
 def _with_response(

@@ -66,16 +66,31 @@ def learnt_beside(
         sight, own = sight.inverted(response.curve), family("linear")
     if not sight.is_more_beside(own):
         return None
-    if response.origin is not Origin.ASSUMED or not are_dark:
-        return beside_edges(sight.fits([own]), sight.profiles)
-    fits = sight.fits([own, *(family(name) for name in ("linear", "srgb") if name != own.name)])
-    elsewhere = sum(
-        float(p)
-        for p, fit in zip(probabilities(fits), fits, strict=True)
-        if fit.family is not own and not fit.scene.name
-    )
-    same = [fit for fit in fits if fit.family is own]
-    return None if elsewhere > 0.5 else beside_edges(same, sight.profiles)
+    is_assumed = response.origin is Origin.ASSUMED and are_dark
+    rivals = [family(name) for name in ("linear", "srgb") if is_assumed and name != own.name]
+    return told_beside(sight.fits([own, *rivals]), own.name, sight.profiles)
+
+
+def told_beside(fits: Sequence[EdgeFit], curve: str, profiles: Sequence[EdgeProfile]) -> BesideEdges | None:
+    """What stands beside the edges behind one tone curve, if that is more probable than plain edges behind any other.
+
+    Otherwise plain edges stay where they are, and what would displace them is in their uncertainty.
+
+    Parameters
+    ----------
+    fits : sequence of EdgeFit
+        Fits of scenes and tone curves, the most probable first.
+    curve : str
+        Name of the tone curve that is used.
+    profiles : sequence of EdgeProfile
+        Profiles of dark fingers.
+    """
+    same = [fit for fit in fits if fit.family.name == curve]
+    beside = beside_edges(same, profiles) if any(fit.scene.name for fit in same) else None
+    told = sum(float(p) for p, fit in zip(probabilities(fits), fits, strict=True) if fit.scene.name)
+    if beside is None or told > 0.5 or len(same) == len(fits):
+        return beside
+    return less_sure(None, float(np.hypot(beside.u_gap_px, sum(beside.inner_px))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
