@@ -101,10 +101,25 @@ def _shift(assumed: CameraResponse, other: CameraResponse, inside: int, outside:
     step, _, _ = blurred_step(borders, np.full((PHASES_PX.size, 1), sigma))
     light = there[0] + (there[1] - there[0]) * step
     seen = 255.0 * np.interp(np.interp(light, other_light, shares), shares, assumed_light)
+    return mean_shift_px(seen, reach, sigma)
+
+
+def mean_shift_px(levels: Floats, reach_px: int, sigma_px: float) -> float:
+    """Mean displacement of the step fitted to levels, from the edges at `PHASES_PX` (pixels, outwards).
+
+    Parameters
+    ----------
+    levels : ndarray of float, shape (phases, pixels)
+        Levels across an edge at each sub-pixel position, from inside to outside.
+    reach_px : int
+        Half-length of the window.
+    sigma_px : float
+        Gaussian sigma of the edge.
+    """
     count = PHASES_PX.size
     lines = Lines(np.zeros(count), np.ones(count), np.zeros(count, dtype=np.intp))
-    filters, position, width = edge_filters(reach), PHASES_PX.copy(), np.array([sigma])
+    filters, position, width = edge_filters(reach_px), PHASES_PX.copy(), np.array([sigma_px])
     for _look in range(LOOKS):
-        look = filters.look(seen, lines, width, position)
+        look = filters.look(levels, lines, width, position)
         position, width = look.position, look.blur
     return float(np.mean(position - PHASES_PX))

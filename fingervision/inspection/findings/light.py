@@ -3,31 +3,26 @@
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingervision.inspection.blocks import HEAVY
 from fingervision.inspection.finding import Finding, Severity, weighed, without
 from fingervision.inspection.findings.exposure import DIM, WANTED
-from fingervision.inspection.ground_slope import StepProfile, fit_step, ground_slope
+from fingervision.inspection.ground_slope import ground_slope
 from fingervision.inspection.noise_bound import GOOD_NOISE
 from fingervision.inspection.plateaus import plateaus
 from fingervision.inspection.sample import Sample
-from fingervision.vision.flank_profiles import flank_profile
-
-Floats = NDArray[np.float64]
 
 WEAK = "Light the background from behind, or darken the fingers, and lower the camera's gain."
 UNEVEN = "Make the light uniform across the gap: use a diffuser behind the fingers, at a larger distance from them."
 FORMULA = (
     "sqrt(n^2 + e^2 + s^2); n = sqrt(u^2 - u'^2), u the random uncertainty, u' the random uncertainty with noise of 2 "
-    "% of the contrast (Cramer-Rao bound); e is the change of the gap if the plateaus beside each edge may slope, or "
-    "by the slope of the background over half of the gap, whichever is larger; s is u_shift_px if noise or uneven "
-    "light causes it, else 0"
+    "% of the contrast (Cramer-Rao bound); e is the change of the gap by the slope of the background over half of the "
+    "gap; s is u_shift_px if noise or uneven light causes it, else 0"
 )
 
 
 def find(sample: Sample) -> Finding | None:
-    """Compare the noise with the contrast, and fit the edges with a slope of the light on either side."""
+    """Compare the noise with the contrast, and state what the slope of the background's light does to the gap."""
     if not sample.looks:
         return _lost(sample)
     bright = plateaus(sample).bright
@@ -63,40 +58,9 @@ def _lost(sample: Sample) -> Finding | None:
 
 
 def uneven_light_px(sample: Sample) -> float:
-    """Change of the gap caused by uneven light beside the inner edges (pixels)."""
+    """Change of the gap by the slopes of the background over half of the gap, beyond that of a pattern (pixels)."""
     levels = int(np.iinfo(sample.looks[0].upright.dtype).max) + 1
     light = sample.settings.response.table(sample.top_level, levels)
-    return max(_near_px(sample, light), _across_gap_px(sample, light))
-
-
-def _near_px(sample: Sample, light: Floats) -> float:
-    """Change of the gap if the light slopes on both sides of each edge within the window of its profile (pixels)."""
-    seen = [(look.upright, look.edges) for look in sample.looks]
-    moved = 0.0
-    for side in range(2):
-        stored = flank_profile(seen, side, is_inner=True, top_level=sample.top_level)
-        if stored is None:
-            return 0.0
-        levels = sample.top_level * stored.level
-        gain = np.interp(levels, np.arange(light.size), np.gradient(light))
-        profile = StepProfile(
-            stored.away_px,
-            np.interp(levels, np.arange(light.size), light),
-            np.maximum(sample.top_level * stored.u_level * gain, 1e-6),
-        )
-        blur_px = sample.median(edges.blur_px[side, 0] for _, edges in seen)
-        flat, sloping = (fit_step(profile, blur_px, sloping=slopes) for slopes in (False, True))
-        # Slopes that do not improve the fit significantly are noise; small slopes are caused by a pattern or a codec.
-        if sloping.slope_share < LEAST_SLOPE:
-            continue
-        if flat.chi_square - sloping.chi_square < SIGNIFICANT * max(sloping.chi_square / sloping.freedom, 1.0):
-            continue
-        moved += flat.position_px - sloping.position_px
-    return without(abs(moved), PATTERN_PX)
-
-
-def _across_gap_px(sample: Sample, light: Floats) -> float:
-    """Change of the gap by the slopes of the background over half of the gap, beyond that of a pattern (pixels)."""
     slopes = [ground_slope(sample.looks, side, light) for side in range(2)]
     if slopes[0] is None or slopes[1] is None:
         return 0.0
@@ -104,13 +68,6 @@ def _across_gap_px(sample: Sample, light: Floats) -> float:
     return without(abs(moved), SLOPE_SIGMAS * u_px)
 
 
-# Chi-square with two degrees of freedom (two slopes) that noise exceeds once in ten thousand cases.
-SIGNIFICANT = 18.4
-# The light is regarded as uneven if it changes by this share of the contrast within the window of an edge.
-LEAST_SLOPE = 0.05
-# A pattern on the background causes a change of the gap up to this value, as the short window of an edge shows it (good
-# set-ups in `tests.benchmarks.faulty_setups`).
-PATTERN_PX = 0.05
 # A change of the gap within this number of standard uncertainties is a pattern: 99 % of Student's distribution with the
 # six degrees of freedom of two flanks in four parts.
 SLOPE_SIGMAS = 3.7
