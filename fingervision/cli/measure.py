@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from fingervision.cli._command import FILE, MEASURED, OUTPUT, make_command, option
 from fingervision.cli._options import (
@@ -16,9 +17,10 @@ from fingervision.cli._options import (
     region_from,
     where_to_measure,
 )
-from fingervision.domain.errors import UsageError
+from fingervision.domain.errors import FingervisionError, UsageError
 
 if TYPE_CHECKING:
+    from fingervision.measuring.body_poses import FollowedBodies
     from fingervision.measuring.drawing_placement import GivenPoint
     from fingervision.measuring.measure import Measured
     from fingervision.measuring.task import Task
@@ -82,7 +84,8 @@ Exit codes: 0 done; 1 failed, or fewer than one frame in ten shows fingers; 2 wr
     "--mechanism",
     type=FILE,
     group=MEASURED,
-    help="gripper.toml or mechanism.toml: also measure the poses of its bodies; written to bodies.csv.",
+    help="gripper.toml or mechanism.toml: also measure the poses of its bodies (bodies.csv) and the distances of its "
+    "pairs (gauges.csv); its fingers need no --roi.",
 )
 @option(
     "--at",
@@ -146,10 +149,21 @@ def command(
     )
     # Errors of the drawing or its points are reported before the recording is measured.
     drawing = None if mechanism is None else _drawing(mechanism, points)
+    bodies, why_not = None, None
+    if drawing is not None:
+        source = click.get_current_context().get_parameter_source("below_tip_mm")
+        is_stated = source != ParameterSource.DEFAULT
+        try:
+            bodies, task = _located(recording, rate_hz, task, drawing, is_height_stated=is_stated)
+        except FingervisionError as error:
+            # The gap is measured all the same, where the picture shows two fingers.
+            why_not = error
     measured = measure_into(out, recording, task, rate_hz, progress=True)
     _report(measured, as_json)
-    if drawing is not None:
-        _measure_bodies(recording, rate_hz, task, drawing, measured.folder.path, as_json=as_json)
+    if bodies is not None:
+        _write_bodies(bodies, measured.folder.path, task, as_json=as_json)
+    if why_not is not None:
+        raise why_not
     raise SystemExit(int(measured.exit_code))
 
 
@@ -176,35 +190,48 @@ def _drawing(path: Path, points: tuple[str, ...]) -> tuple["Mechanism", list["Gi
     return whole_mechanism(gripper, gripper, path.stem), given
 
 
-def _measure_bodies(
+def _located(
     recording: str,
     rate_hz: float | None,
     task: "Task",
     drawing: tuple["Mechanism", list["GivenPoint"]],
-    folder: Path,
     *,
-    as_json: bool,
-) -> None:
-    """Write bodies.csv, and print in how many frames each body was found."""
+    is_height_stated: bool,
+) -> tuple["FollowedBodies", "Task"]:
+    """Follow the bodies of the drawing, and state where its fingers and pairs are seen."""
     from fingervision.frames.source import Wish, open_source
-    from fingervision.measuring.body_poses import measure_bodies
+    from fingervision.measuring.body_poses import BodyTracker, FollowedBodies
+    from fingervision.measuring.drawn_fingers import located
     from fingervision.measuring.frame_loop import coded, prepared
     from fingervision.measuring.task import task_for_frames
 
     source = open_source(recording, Wish(rate_hz=rate_hz))
-    task = task_for_frames(task, source.description)
-    how = prepared(source.description, task)
-    frames = coded(source, how.description.coding)
-    done = measure_bodies(frames, drawing[0], task.scale, drawing[1], folder, how.settings)
+    how = prepared(source.description, task_for_frames(task, source.description))
+    tracker = BodyTracker(drawing[0], task.scale, drawing[1], how.settings)
+    bodies = FollowedBodies(tracker, list(tracker.poses(coded(source, how.description.coding))))
+    size_px = source.description.width_px, source.description.height_px
+    return bodies, located(task, bodies, size_px, at_drawn_height=not is_height_stated)
+
+
+def _write_bodies(bodies: "FollowedBodies", folder: Path, task: "Task", *, as_json: bool) -> None:
+    """Write bodies.csv, and print in how many frames each body was found."""
+    from fingervision.measuring.drawn_fingers import GAP
+
+    path, placed = bodies.write(folder), bodies.tracker.placed
     if as_json:
         return
-    for name, counts in done.counts.items():
+    for name, counts in bodies.counts.items():
         others = ", ".join(f"{count} {status}" for status, count in counts.items() if status != "ok")
         said = f" ({others})" if others else ""
         click.echo(f"  {name}: seen in {counts['ok']} of {sum(counts.values())} frames{said}")
-    for note in () if done.placed is None else done.placed.notes:
+    for note in () if placed is None else placed.notes:
         click.echo(f"  note: {note}")
-    click.echo(f"  {done.path}")
+    if GAP in bodies.tracker.mechanism.pairs:
+        click.echo(
+            f"  note: the gap is measured {task.below_tip_mm:.3g} mm below the tips; the distance at the points of the "
+            "drawing is that of the pair gap, in gauges.csv."
+        )
+    click.echo(f"  {path}")
 
 
 def _report(measured: "Measured", as_json: bool) -> None:

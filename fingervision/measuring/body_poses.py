@@ -95,28 +95,6 @@ LAID_BY_ALL = (
 )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BodiesMeasured:
-    """Result of measuring the poses of the bodies in a recording.
-
-    Parameters
-    ----------
-    path : Path
-        Path of bodies.csv.
-    poses : list of FramePoses
-        Poses of all bodies, for every frame.
-    counts : mapping of str to Counter
-        Number of frames with each status, for every body and hinge.
-    placed : Placed or None
-        Position of the drawing in the picture; None if no frame could be read.
-    """
-
-    path: Path
-    poses: list[FramePoses]
-    counts: Mapping[str, Counter[str]]
-    placed: Placed | None
-
-
 class BodyTracker:
     """Tracks the bodies of a mechanism from frame to frame.
 
@@ -330,40 +308,35 @@ class BodyTracker:
         return held[0] if held else min(self.outlines, key=lambda o: float(np.hypot(*(o.body.centroid_mm - at))))
 
 
-def measure_bodies(
-    source: Iterable[Frame | LostFrame],
-    mechanism: Mechanism,
-    scale: Scale,
-    points: Sequence[GivenPoint],
-    out: Path,
-    settings: Settings | None = None,
-) -> BodiesMeasured:
-    """Measure the bodies of a recording into bodies.csv, and add columns for them to an existing gaps.csv.
+@dataclass(frozen=True, slots=True, eq=False)
+class FollowedBodies:
+    """The bodies of a mechanism in all frames of a recording.
 
     Parameters
     ----------
-    source : iterable of Frame or LostFrame
-        The recording; its frames are read once, in order.
-    mechanism : Mechanism
-        The drawing.
-    scale : Scale
-        Conversion from pixels to millimetres.
-    points : sequence of GivenPoint
-        Points of the drawing and their positions in the first picture; if empty, the silhouette is used.
-    out : Path
-        Folder of the results.
-    settings : Settings or None
-        Settings of the measurement; None for the defaults.
+    tracker : BodyTracker
+        What followed them.
+    poses : list of FramePoses
+        Poses of all bodies, for every frame.
     """
-    tracker = BodyTracker(mechanism, scale, points, settings)
-    poses = list(tracker.poses(source))
-    write_bodies(out / BODIES, poses)
-    write_flexures(out / FLEXURES, flexures_at_rest(tracker.first, mechanism.flexures))
-    gaps = out / GAPS
-    if gaps.is_file():
-        moving = [outline.body.name for outline in tracker.outlines if not outline.body.is_fixed]
-        hinges = [flexure.name for flexure in mechanism.flexures]
-        add_channels(gaps, poses, {name: column_name(name) for name in (*moving, *hinges)})
-    counts = {name: Counter(frame.poses[name].status for frame in poses if name in frame.poses)
-              for name in (poses[0].poses if poses else {})}  # fmt: skip
-    return BodiesMeasured(out / BODIES, poses, counts, tracker.placed)
+
+    tracker: BodyTracker
+    poses: list[FramePoses]
+
+    @property
+    def counts(self) -> Mapping[str, Counter[str]]:
+        """Number of frames with each status, for every body and hinge."""
+        names = self.poses[0].poses if self.poses else {}
+        return {name: Counter(frame.poses[name].status for frame in self.poses) for name in names}
+
+    def write(self, out: Path) -> Path:
+        """Write bodies.csv and flexures.csv, and add columns to an existing gaps.csv; give the path of bodies.csv."""
+        flexures = self.tracker.mechanism.flexures
+        write_bodies(out / BODIES, self.poses)
+        write_flexures(out / FLEXURES, flexures_at_rest(self.tracker.first, flexures))
+        gaps = out / GAPS
+        if gaps.is_file():
+            moving = [outline.body.name for outline in self.tracker.outlines if not outline.body.is_fixed]
+            names = (*moving, *(flexure.name for flexure in flexures))
+            add_channels(gaps, self.poses, {name: column_name(name) for name in names})
+        return out / BODIES

@@ -15,6 +15,7 @@ from fingervision.frames.source import Description
 from fingervision.gauges.gauge_file import Gauge, check_gauges
 from fingervision.measuring.gap_budget import choose_response
 from fingervision.measuring.scale import Scale, scale_for_frames
+from fingervision.vision.flanks import STEEPEST
 from fingervision.vision.pipeline import Settings
 
 
@@ -52,6 +53,8 @@ class Task:
         Whether the fingers are darker than the background; None determines it from the first frames.
     is_outline : bool
         Whether a thick part is measured at its whole outline, side walls included, rather than at its front face.
+    steepest : float
+        Largest inclination of a finger's flank against its axis, in pixels across per pixel along it.
     frames : (int, int) or None
         First and last frame to be measured, counted from 0, both included; None measures all.
     gauges : tuple of Gauge
@@ -72,6 +75,7 @@ class Task:
     bits: int | None = None
     fingers_are_dark: bool | None = None
     is_outline: bool = False
+    steepest: float = STEEPEST
     frames: tuple[int, int] | None = None
     gauges: tuple[Gauge, ...] = ()
 
@@ -107,6 +111,7 @@ class Task:
             self.bits,
             self.fingers_are_dark,
             self.is_outline,
+            self.steepest,
             CameraModel(response),
         )
         return settings, words

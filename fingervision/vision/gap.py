@@ -16,7 +16,7 @@ from fingervision.vision.finger_end import FingerEnd, fit_from_any_radius
 from fingervision.vision.finger_shape import OUTER_M, PARAMETERS
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers, is_hidden
 from fingervision.vision.first_guess import first_guess
-from fingervision.vision.flanks import STEEPEST, has_straight_flanks
+from fingervision.vision.flanks import has_straight_flanks
 from fingervision.vision.held_part import held_part
 from fingervision.vision.likeness import FARTHEST_TURNED, LEANS_ALIKE, common_turn
 from fingervision.vision.local_outline import FLATTEST, local_measuring_point
@@ -82,6 +82,7 @@ def measure_gap(
     below_tip_px: float,
     full_scale: int,
     light_gap: bool,
+    steepest: float,
     coding: Coding,
     coded_points: float,
 ) -> GapMeasurement | NoGap:
@@ -99,6 +100,8 @@ def measure_gap(
         Largest grey level.
     light_gap : bool
         Whether the fingers are darker than the gap.
+    steepest : float
+        Largest inclination of a flank against the finger's axis.
     coding : Coding
         Coding of the picture.
     coded_points : float
@@ -128,7 +131,7 @@ def measure_gap(
         fitted = with_corner_doubt(list(points), [left, right], fitted, below_tip_px, rough.shared_px)
     stray = 1.0 if rough is None else rough.shared_px
     holds = [shape_holds(*one, below_tip_px, stray) for one in zip(points, (left, right), fitted, strict=True)]
-    refusal = _no_fingers(fingers, (left, right), below_tip_px)
+    refusal = _no_fingers(fingers, (left, right), below_tip_px, steepest)
     if refusal is not None:
         return refusal
     held = None
@@ -319,11 +322,13 @@ def _way_px(edges: EdgePoints) -> float:
     return sqrt(12.0 * max(0.0, float((flanks - tips).max())))
 
 
-def _no_fingers(fingers: CoarseFingers, ends: tuple[FingerEnd, FingerEnd], below_tip_px: float) -> NoGap | None:
+def _no_fingers(
+    fingers: CoarseFingers, ends: tuple[FingerEnd, FingerEnd], below_tip_px: float, steepest: float
+) -> NoGap | None:
     """Return the status `no_fingers` or `one_finger` if an object has no straight flanks, as fingers have."""
     pair = (fingers.left, fingers.right)
     turn = common_turn([finger.inner_sign * end.parameters[OUTER_M] for finger, end in zip(pair, ends, strict=True)])
-    are_fingers = [has_straight_flanks(finger.top, below_tip_px, STEEPEST + abs(turn)) for finger in pair]
+    are_fingers = [has_straight_flanks(finger.top, below_tip_px, steepest + abs(turn)) for finger in pair]
     if abs(turn) > FARTHEST_TURNED and any(are_fingers):
         return NoGap(
             Status.NO_FINGERS,

@@ -285,7 +285,16 @@ def _edges_and_gap(
     if beside is not None:
         edges = moved_by_recording(upright, edges, light, beside, settings.is_outline)
     edges = with_stripes(upright, edges, light)
-    outcome = measure_gap(fingers, edges, settings.below_tip_px, top, light_gap, coded.coding, coded.shared_points)
+    outcome = measure_gap(
+        fingers,
+        edges,
+        settings.below_tip_px,
+        top,
+        light_gap,
+        settings.steepest,
+        coded.coding,
+        coded.shared_points,
+    )
     if isinstance(outcome, GapMeasurement):
         outcome = coded.less_sure(outcome, upright, edges, fingers.orientation, light, top)
     if (apart_px or edges.beside or is_unlike) and isinstance(outcome, GapMeasurement):

@@ -6,6 +6,7 @@ from calib.camera_response import CameraResponse, standard_response
 from fingervision.domain.camera import ASSUMED_CAMERA, CameraModel, stated_camera
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Region
+from fingervision.vision.flanks import STEEPEST
 
 # A camera that is known to be linear.
 LINEAR_CAMERA = stated_camera(standard_response("linear"))
@@ -29,6 +30,8 @@ class Settings:
         Whether the fingers are darker than the background; None determines it in every frame.
     is_outline : bool
         Whether a thick part is measured at its whole outline, side walls included, rather than at its front face.
+    steepest : float
+        Largest inclination of a finger's flank against its axis, in pixels across per pixel along it.
     camera : CameraModel
         What is known about the camera: response, point spread, noise, sharpening, lag, defect pixels.
     """
@@ -39,6 +42,7 @@ class Settings:
     bits: int | None = None
     fingers_are_dark: bool | None = None
     is_outline: bool = False
+    steepest: float = STEEPEST
     camera: CameraModel = ASSUMED_CAMERA
 
     @property

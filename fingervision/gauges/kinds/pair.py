@@ -46,9 +46,18 @@ SPEC = PairSpec
 
 
 class FollowedPair:
-    """Tracks two edges through the frames of one recording; edges near each other are fitted together."""
+    """Tracks two edges through the frames of one recording; edges near each other are fitted together.
 
-    def __init__(self, spec: PairSpec) -> None:
+    Parameters
+    ----------
+    spec : PairSpec
+        Settings of the gauge.
+    along_px : float
+        Where the distance is taken: distance along the edges from the middle of what is fitted.
+    """
+
+    def __init__(self, spec: PairSpec, along_px: float = 0.0) -> None:
+        self._along_px = along_px
         axes = Axes(*spec.middle_px, radians(spec.direction_deg))
         self._edges = [
             EdgeFollower(axes, side * 0.5 * spec.distance_px, spec.length_px, spec.reach_px, polarity)
@@ -74,12 +83,15 @@ class FollowedPair:
         (left, right), covariance = found
         for edge, one in zip(self._edges, (left, right), strict=True):
             edge.keep(one)
-        places = tuple(axes.point(one.position_px) for one in (left, right))
+        along = self._along_px
+        places = tuple(axes.point(one.position_px + one.slope * along, along) for one in (left, right))
         half = 0.5 * first.length_px
         marks = [
             Mark(tuple(axes.point(one.position_px + one.slope * s, s) for s in (-half, half))) for one in (left, right)
         ]
-        u = sqrt(max(left.u_position_px**2 + right.u_position_px**2 - 2.0 * covariance, 0.0))
+        variances = (one.u_position_px**2 + 2.0 * along * one.covariance_px + (along * one.u_slope) ** 2
+                     for one in (left, right))  # fmt: skip
+        u = sqrt(max(sum(variances) - 2.0 * covariance, 0.0))
         polarity = 0 if left.contrast * right.contrast > 0.0 else left.dark_side * -1
         u_response = 0.5 * (left.u_response_px + right.u_response_px)
         quantity = Distance(places[0], places[1], u, polarity, u_response)
