@@ -84,6 +84,8 @@ LEAST_SIZE_ERROR, MOST_SIZE_ERROR, SURE = 1e-3, 0.01, 4.0
 uncertainties above which a size error is significant. Printed parts and scales have errors of about 0.2 %; above 1 %,
 the scale or the drawing is wrong.
 """
+AT_REST: tuple[Array, float] = (np.zeros(2), 0.0)
+"""Motion of a body that is where it is drawn."""
 BODIES, GAPS = "bodies.csv", "gaps.csv"
 STILL_FRAMES = 8
 """Largest number of frames from which the flexures are measured at rest: noise then adds little to the uncertainty that
@@ -234,10 +236,14 @@ class BodyTracker:
         dark = self.placed is not None and self.placed.body_is_dark
         chunks, about, last = self._chunks[number], self._about[number], self._last[number]
         found = fit_rigid(grey, chunks, about, dark, last, view)
-        if found is None or found.seen < 0.8 * found.in_view:
+        # A body that is not near its last pose is searched farther from there, and from the drawn place, about which it
+        # swings: beside another body that has moved too, the way from the last pose may lead to that one's edges.
+        for start in (last, AT_REST):
+            if found is not None and found.seen >= 0.8 * found.in_view:
+                break
             if not pyramid:
                 pyramid += halved(grey, LEVELS)
-            wider = capture_rigid(grey, pyramid, chunks, about, dark, last, view)
+            wider = capture_rigid(grey, pyramid, chunks, about, dark, start, view)
             if found is None or (wider is not None and wider.seen > found.seen):
                 found = wider
         return found

@@ -171,15 +171,16 @@ def drawn_fingers(
     widths = [pair.until_mm(body.holds, at, way) for body, at, way
               in zip(pair.bodies, pair.behind_mm.T, (-pair.across, pair.across), strict=True)]  # fmt: skip
     open_mm = pair.until_mm(mechanism.region.holds, middle, -up)
-    face_mm = np.clip(SHOWN * min(pair.extent_mm(-up)), *(share * max(widths) for share in DEPTHS_PER_WIDTH))
-    depth_mm = min(SHOWN * open_mm, float(face_mm))
+    least_mm, most_mm = (share * max(widths) for share in DEPTHS_PER_WIDTH)
+    face_mm = min(max(SHOWN * min(pair.extent_mm(-up)), least_mm), most_mm)
+    depth_mm = min(SHOWN * open_mm, face_mm)
     x, y = place.axes @ up
     pointing = {Direction.RIGHT: x, Direction.LEFT: -x, Direction.DOWN: y, Direction.UP: -y}
     direction = max(pointing, key=lambda way: pointing[way])
     axis, sign = (1 if direction.is_vertical else 0), (1.0 if direction in (Direction.DOWN, Direction.RIGHT) else -1.0)
     shown, ends, steepest, below_px = [], [], 0.0, sum(to_tips) / 2.0 * place.px_per_mm
     for body, at, tip_mm in zip(pair.bodies, pair.points_mm.T, to_tips, strict=True):
-        corners = body.corners_mm
+        corners = body.outline.corners_mm
         below_mm = up @ (at[:, None] - corners)
         part = np.concatenate([corners[:, below_mm <= depth_mm], _crossings(corners, below_mm - depth_mm)], axis=1)
         corner, end = (at + tip_mm * up)[:, None], (at - depth_mm * up)[:, None]
@@ -254,7 +255,8 @@ def pair_gauges(bodies: FollowedBodies, placed: Placed) -> Iterator[Gauge]:
     """Make a gauge of every pair of the drawing whose faces are long enough to be fitted."""
     place, polarity = placed.place, "light" if placed.body_is_dark else "dark"
     for pair in facing_pairs(bodies.tracker.mechanism, place.px_per_mm):
-        down = max((pair.along, -pair.along), key=lambda way, pair=pair: min(pair.extent_mm(way)))
+        extents = {1.0: min(pair.extent_mm(pair.along)), -1.0: min(pair.extent_mm(-pair.along))}
+        down = max(extents, key=lambda sign: extents[sign]) * pair.along
         above_px, below_px = (min(pair.extent_mm(way)) * place.px_per_mm - FROM_CORNER_PX for way in (-down, down))
         length_px = min(above_px + below_px, LONGEST_FACE_PX)
         if length_px < SHORTEST_FACE_PX:
@@ -265,9 +267,9 @@ def pair_gauges(bodies: FollowedBodies, placed: Placed) -> Iterator[Gauge]:
         for each in bodies.poses:
             poses = [each.poses.get(body.name) for body in pair.bodies]
             if all(pose is not None and pose.x_mm is not None for pose in poses):
-                ends = [place.to_px(moved_mm(body, pose, points[:, k::2]))
-                        for k, (body, pose) in enumerate(zip(pair.bodies, poses, strict=True))]  # fmt: skip
-                by_frame[each.frame] = _carried(*ends, length_px, polarity)
+                first, last = (place.to_px(moved_mm(body, pose, points[:, k::2]))
+                               for k, (body, pose) in enumerate(zip(pair.bodies, poses, strict=True)))  # fmt: skip
+                by_frame[each.frame] = _carried(first, last, length_px, polarity)
         if by_frame:
             yield Gauge(pair.name, "pair", CarriedPair(next(iter(by_frame.values()))[0].middle_px, by_frame))
 

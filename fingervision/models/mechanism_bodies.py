@@ -112,11 +112,6 @@ class LinkBody:
     holes: tuple[Loop, ...]
     centroid_mm: Array
 
-    @property
-    def corners_mm(self) -> Array:
-        """Corners of the outline in their order, shape (2, n); arcs are replaced by their chords."""
-        return _corners(self.outline)
-
     def holds(self, points_mm: Array) -> Flags:
         """Whether points, shape (2, n), lie in the body; arcs are replaced by their chords."""
         inside = self.outline.holds(points_mm)

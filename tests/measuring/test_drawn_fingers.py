@@ -33,7 +33,7 @@ def filmed(folder: Path, angle_deg: float) -> Path:
         loops = []
         for body in bodies_of(mechanism):
             way = {"right_jaw": -closed, "left_jaw": closed}.get(body.name, 0.0)
-            loops.append(body.corners_mm + np.array([[way], [0.0]]))
+            loops.append(body.outline.corners_mm + np.array([[way], [0.0]]))
         for x in (6.0, 17.0, -6.0, -17.0):
             way = -np.sign(x) * closed
             loops.append(np.array([[x - 0.3, x + 0.3, x + 0.3 + way, x - 0.3 + way], [-0.5, -0.5, 20.5, 20.5]]))
