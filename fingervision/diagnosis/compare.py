@@ -7,11 +7,9 @@ import numpy as np
 from fingervision.diagnosis.bodies.body_evidence import body_evidence, drawing_of
 from fingervision.diagnosis.bodies.place_diagnosis import without_places
 from fingervision.diagnosis.bodies.place_words import body_places
-from fingervision.diagnosis.inference.explanation_candidates import single_effects
 from fingervision.diagnosis.inference.held_out_prediction import rms_mm
 from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.inference.plausibility import mistaken_column
-from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.diagnosis.inference.verdict import isolated, limited_noises_mm
 from fingervision.diagnosis.input.intersample_interpolation import likelier_interpolation
 from fingervision.diagnosis.input.observations import Observations
@@ -26,8 +24,6 @@ from fingervision.models.corrected import CorrectedModel
 MOST_REFITS = 4
 """Most iterations of Newton's method for a drawing's uncertain dimensions; small changes of links and hinges need
 two."""
-ROUGH_STEPS = 7
-"""Iterations of an effect's fit that only decides whether to ask about the table."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,9 +122,6 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
         found = (*found, *(() if evidence is None else body_places(evidence, answers)))
         data = replace(data, notes=(*data.notes, *notes))
     mistake = mistaken_column(data, problem, (problem.nothing(),))
-    if mistake is not None:
-        # Only a question that no single effect answers is asked.
-        mistake = mistaken_column(data, problem, single_effects(problem, signatures(problem), ROUGH_STEPS, 1))
     if mistake is not None:
         data = replace(data, notes=(*data.notes, mistake.words))
     n, both = history.input_mm.size, history.both_edges

@@ -16,6 +16,9 @@ from fingervision.effects.play_operator import play
 
 UNITS = (10.0, 25.4, 100.0, 1000.0, 1e6)
 """Ratios of units of length that are confused: powers of ten, and inches."""
+LARGEST_RATIO = 2.03
+"""Largest ratio of measured to predicted motion (or its inverse) that effects may cause, where none was fitted: the
+catalogue's scale, lever and input errors together reach 1.3 * 1.3 * 1.2."""
 HALF = 0.5
 """Largest share of the variance of the disagreement and (unless the gap does not follow the input at all) of the gap
 itself that a mistake in the table may leave, if it is the mistake and not an effect that explains the table."""
@@ -71,12 +74,15 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
     problem : Problem
         Estimation problem with its noise.
     rivals : sequence of Explanation
-        Explanations by effects, and the model without effects.
+        Explanations by effects, and the model without effects. If there is none but the latter, only gains are asked
+        about that no effect has; a delay, for example, can mirror a motion.
     """
     units = [each for unit in UNITS for each in (unit, 1.0 / unit)]
     gains = [(gain, 0) for gain in (0.0, -1.0, *units, *(-each for each in units))]
     free = _free_gain(data, problem)
     gains += [] if free is None else [(free, 1)]
+    if not any(rival.names for rival in rivals):
+        gains = [each for each in gains if each[0] > 0.0 and not 1.0 / LARGEST_RATIO < each[0] < LARGEST_RATIO]
     able = [each for each in gains if _leaves_less(data, problem, each[0])]
     # Three kinds of mistake are equally likely beforehand: a column of something else, a sign, and one of many ratios.
     price = {gain: 2.0 * float(np.log(3.0 * (1 if gain in (0.0, -1.0) else len(gains)))) for gain, _ in gains}
