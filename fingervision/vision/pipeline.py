@@ -230,8 +230,7 @@ def _attempt(grey: GreyImage, settings: Settings, coded: CodedPicture) -> _Attem
             attempt = _Attempt(fingers, split)
         else:
             attempt = _measured(grey, split, fingers, light_gap, settings, coded, scale)
-            if not _is_told_beside(settings.camera):
-                attempt = _with_two_tones(attempt, grey, denoised, light_gap, settings, coded, scale)
+            attempt = _with_two_tones(attempt, grey, denoised, light_gap, settings, coded, scale)
         if isinstance(attempt.outcome, GapMeasurement) or attempt.outcome.status in FINAL:
             return attempt
         first = first or attempt

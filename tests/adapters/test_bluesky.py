@@ -115,12 +115,16 @@ def test_a_flight_gives_an_event_a_frame_and_the_agent_names_what_is_hidden(
 
 def test_events_are_measured_by_the_camera_that_the_first_frames_show(made: Devices) -> None:
     assert made.gap is not None
-    made.gap.kickoff()
-    made.stage.prepare((0.2, 0.5))
-    made.stage.kickoff()
-    assert made.stage.complete().exception(PATIENCE_S) is None
-    assert made.gap.complete().exception(PATIENCE_S) is None
-    flown = list(made.gap.collect())
+    flown: list[Any] = []
+    for target_mm in (0.2, 0.0, 0.2, 0.0):  # a busy machine takes fewer pictures in a flight
+        made.gap.kickoff()
+        made.stage.prepare((target_mm, 0.5))
+        made.stage.kickoff()
+        assert made.stage.complete().exception(PATIENCE_S) is None
+        assert made.gap.complete().exception(PATIENCE_S) is None
+        flown += made.gap.collect()
+        if len(flown) >= WANTED:
+            break
     assert made.gap.trigger().exception(PATIENCE_S) is None
     assert made.gap._sight.settings.camera.response.origin is Origin.LEARNT
     assert len(flown) >= WANTED

@@ -186,3 +186,18 @@ def test_the_spaces_of_a_letter_are_no_fingers() -> None:
         canvas.fill(box(arm_px, 180, arm_px + 24, 290), 200.0)
     found = measure_picture(Frame(canvas.shot(1.0, 2.0, rng), 0), SETTINGS)
     assert isinstance(found, NoGap), found
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5])
+@pytest.mark.parametrize("width_px", [16.0, 25.0])
+def test_a_hard_shadow_to_one_side_of_both_fingers_is_no_finger(width_px: float, share: float) -> None:
+    for number in (1, 7, 13):
+        scene = Scene(np.random.default_rng([number, 96]))
+        for finger in scene.pair:
+            below_px = scene.rng.uniform(0.0, 6.0)
+            scene.canvas.fill(finger.outline() + np.array([width_px, below_px]), scene.tones.between(share))
+        scene.paint()
+        shot = scene.done()
+        found = measure_picture(Frame(shot.picture, 0), SETTINGS)
+        assert shot.gap_px is not None
+        assert isinstance(found, NoGap) or abs(found.gap_px - shot.gap_px) < 1.0  # not by the shadow's width
