@@ -115,8 +115,8 @@ def test_pictures_do_not_wait_in_memory_while_the_camera_is_learnt(
         pictures.append(weakref.ref(frame.pixels))
         run.add(RecordedFrame(frame, ()))
         del frame
-        # What waits, and the decoder's eight frames ahead; the learning keeps copies.
-        assert sum(picture() is not None for picture in pictures) <= run_table.FRAMES_WAITING + FRAMES_AHEAD + 2
+    # What waits, and the decoder's eight frames ahead; the learning keeps copies.
+    assert sum(picture() is not None for picture in pictures) <= run_table.FRAMES_WAITING + FRAMES_AHEAD + 2
     run.close("The test ended.")
     measure(open_source(str(run.path / "video.mp4")), task, tmp_path / "again")
     live, again = ((path / "gaps.csv").read_text() for path in (run.path, tmp_path / "again"))
