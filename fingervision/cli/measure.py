@@ -226,7 +226,7 @@ def _write_bodies(bodies: "FollowedBodies", folder: Path, task: "Task", *, as_js
         click.echo(f"  {name}: seen in {counts['ok']} of {sum(counts.values())} frames{said}")
     for note in () if placed is None else placed.notes:
         click.echo(f"  note: {note}")
-    if GAP in bodies.tracker.mechanism.pairs:
+    if any(gauge.name == GAP for gauge in task.gauges):
         click.echo(
             f"  note: the gap is measured {task.below_tip_mm:.3g} mm below the tips; the distance at the points of the "
             "drawing is that of the pair gap, in gauges.csv."
