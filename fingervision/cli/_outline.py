@@ -48,7 +48,7 @@ across = "free"
 
 
 def begin_drawing(source: Path, out: Path) -> None:
-    """Write NAME.toml, a drawing to complete, and NAME.png, the outline with its strips, from a DXF or SVG file."""
+    """Write NAME.toml, a drawing to complete, and NAME.png, the outline with its flexures, from a DXF or SVG file."""
     region = PlanarRegion(read_outline(source))
     strips, name = strips_of(region, ()), source.stem
     lines = [curve.at(np.linspace(curve.t0, curve.t1, 33)) for loop in region.loops for curve in loop.curves]
@@ -70,7 +70,7 @@ def begin_drawing(source: Path, out: Path) -> None:
         figure.savefig(out / f"{name}.png", dpi=130)
     click.echo(
         f"{source.name}: {x1 - x0:.6g} by {y1 - y0:.6g} mm, {len(region.loops)} closed outlines, {len(strips)} strips "
-        f"that are flexures. Complete the lines of {out / name}.toml that begin with #?, with the help of "
+        f"and notches that are flexures. Complete the lines of {out / name}.toml that begin with #?, with the help of "
         f"{out / name}.png, then run fingervision model {out / name}.toml."
     )
 

@@ -196,7 +196,7 @@ class _Frames:
         axis = np.array([np.cos(angle), np.sin(angle)])
         ends = []
         for cut_mm, height_mm in zip(span.cut_mm, span.heights_mm, strict=True):
-            at_mm = np.array(span.flexure.point_mm(cut_mm, 0.0))
+            at_mm = np.array(span.flexure.section_mm(cut_mm))
             frame = section_frame(self.plate, at_mm, axis, _OVER * height_mm, _NEAR * self.size_mm)
             ends.append(self.add(frame, int(self.piece[nodes_of(self.plate, frame)[0]])) // 3)
         return ends[0], ends[1]

@@ -174,8 +174,7 @@ class Flexure:
         Name of the flexure in messages.
     kind : str
         `circular` and `elliptic`: two discs or ellipses cut into the body; `filleted`: two slots with rounded corners
-        cut into the body; `leaf`: a thin bar added between bodies; `strip`: a thin strip that the bodies and cuts of
-        the drawing leave (`strips`).
+        cut into the body; `leaf`: a thin bar added between bodies; `strip`: a straight strip that is `found`.
     at_mm : (float, float)
         Centre of the flexure.
     axis_deg : float
@@ -187,6 +186,10 @@ class Flexure:
         both are its radius. A leaf has no depth.
     fillet_mm : float
         Radius of the corners of a filleted flexure.
+    lean : float
+        -1 for a notch whose right face, seen along the axis, is cut and whose left one is straight; 0 for equal faces.
+    found : bool
+        Whether the bodies and cuts of the drawing leave the flexure, which then adds and removes nothing (`strips`).
     used : (float, float, float) or None
         Shares of the flexure's strain energy from three deformations: ends that rotate against each other, ends that
         sway, and elongation. None where the shares are unknown.
@@ -200,12 +203,19 @@ class Flexure:
     half_length_mm: float
     depth_mm: float = 0.0
     fillet_mm: float = 0.0
+    lean: float = 0.0
+    found: bool = False
     used: tuple[float, float, float] | None = None
 
     def point_mm(self, along: Any, across: Any) -> tuple[Any, Any]:
         """Convert coordinates along and across the flexure's axis to a point, or to an array of points."""
         c, s = cos(radians(self.axis_deg)), sin(radians(self.axis_deg))
         return self.at_mm[0] + c * along - s * across, self.at_mm[1] + s * along + c * across
+
+    def section_mm(self, along: Any, across: Any = 0.0) -> tuple[Any, Any]:
+        """Convert a position along the axis and one from the middle of the section there to a point, as `point_mm`."""
+        middle = 0.5 * self.lean * (self.height_mm(along) - self.thickness_mm)
+        return self.point_mm(along, middle + across)
 
     def _box(self, along: float, low: float, high: float) -> Polygon:
         places = ((-along, low), (along, low), (along, high), (-along, high))
@@ -214,7 +224,7 @@ class Flexure:
     def steps(self) -> list[tuple[bool, Shape]]:
         """Shapes that the flexure adds to the drawing's region or removes from it."""
         half = 0.5 * self.thickness_mm
-        if self.kind == "strip":
+        if self.found:
             return []
         if self.kind == "leaf":
             ends = (*self.point_mm(-self.half_length_mm, 0.0), *self.point_mm(self.half_length_mm, 0.0))

@@ -39,6 +39,8 @@ _ROUNDS, _BETWEEN = 5, 65
 factor of 64; after five rounds the interval is below 1e-11 of the half length."""
 _BESIDE = 1e-4
 """Distance from a flexure's surface at which material and void are tested, as a share of the thickness."""
+_BESIDE_FOUND = 0.03
+"""The same for a flexure that the outline leaves, whose faces are within 0.02 thicknesses of its form (`strips`)."""
 _BENDS = 2.0
 """Largest ratio of a section's height to the neck's height at which the section bends noticeably: a section twice as
 high has an eighth of the compliance."""
@@ -91,7 +93,7 @@ class FlexureSpan:
         (a, b), (low, high) = self.cut_mm, self.heights_mm
         corners = ((a, -0.5), (b, -0.5), (b, 0.5), (a, 0.5))
         heights = (low, high, high, low)
-        return Polygon(tuple(self.flexure.point_mm(x, s * h * _OVER) for (x, s), h in zip(corners, heights,
+        return Polygon(tuple(self.flexure.section_mm(x, s * h * _OVER) for (x, s), h in zip(corners, heights,
                                                                                          strict=True)))  # fmt: skip
 
     def notch(self, plate_mm: float) -> Notch:
@@ -191,14 +193,14 @@ def _check_neck(flexure: Flexure, region: PlanarRegion) -> None:
     DataError
         If material is missing in a strip of the neck's thickness along the axis, where the notch bends.
     """
-    if not flexure.is_notch:
+    if not flexure.is_notch or flexure.found:
         return
     stations = np.linspace(0.0, flexure.half_length_mm, _SAMPLES)
     heights = flexure.height_mm(stations)
     stations = stations[(heights > _AS_THIN * flexure.thickness_mm) & (heights < _BENDS * flexure.thickness_mm)]
     stations = np.concatenate([stations, -stations])
     half = 0.5 * _AS_THIN * flexure.thickness_mm
-    there = [region.holds(np.stack(flexure.point_mm(stations, np.full(stations.size, y)))) for y in (-half, half)]
+    there = [region.holds(np.stack(flexure.section_mm(stations, np.full(stations.size, y)))) for y in (-half, half)]
     missing = np.abs(stations[~(there[0] & there[1])])
     if missing.size:
         raise DataError(
@@ -210,11 +212,11 @@ def _check_neck(flexure: Flexure, region: PlanarRegion) -> None:
 def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[np.bool_]:
     """Whether, at each position along the axis, the material across the axis is that of the flexure only."""
     half = 0.5 * flexure.height_mm(stations)
-    apart = _BESIDE * flexure.thickness_mm
+    apart = (_BESIDE_FOUND if flexure.found and flexure.is_notch else _BESIDE) * flexure.thickness_mm
     found = np.ones(stations.size, dtype=bool)
     for side in (-1.0, 1.0):
         for beyond, wanted in ((-apart, True), (apart, False)):
-            points = np.stack(flexure.point_mm(stations, side * (half + beyond)))
+            points = np.stack(flexure.section_mm(stations, side * (half + beyond)))
             found &= region.holds(points) == wanted
     return found
 
@@ -229,7 +231,7 @@ def _cut(flexure: Flexure, region: PlanarRegion, side: float, end_mm: float) -> 
     web_mm = float(flexure.height_mm(np.array([end_mm]))[0])
     station = end_mm + _BEYOND * t
     across = 0.5 * web_mm * np.array([-2.0 * _OVER + 1.0, -0.98, 0.0, 0.98, 2.0 * _OVER - 1.0])
-    points = np.stack(flexure.point_mm(np.full(across.size, side * station), across))
+    points = np.stack(flexure.section_mm(np.full(across.size, side * station), across))
     if region.holds(points).tolist() == [False, True, True, True, False]:
         return station, web_mm
     station = _WITHIN * end_mm

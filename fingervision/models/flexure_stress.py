@@ -127,7 +127,7 @@ def nominal_stress(
     stress += factors[1] * 6.0 * np.abs(moment) / (plate_mm * height**2)
     highest = int(np.argmax(stress))
     side = float(np.sign(tension[highest]) * np.sign(moment[highest])) or 1.0
-    place = span.flexure.point_mm(float(x[highest]), -0.5 * side * float(height[highest]))
+    place = span.flexure.section_mm(float(x[highest]), -0.5 * side * float(height[highest]))
     return LargestStress(float(held * stress[highest]), place)
 
 

@@ -221,8 +221,8 @@ class Mechanism:
 
     @property
     def strips(self) -> tuple[Flexure, ...]:
-        """Flexures that the drawing does not name, but its bodies and cuts leave."""
-        return tuple(flexure for flexure in self.flexures if flexure.kind == "strip")
+        """Flexures, strips and notches, that the drawing does not name, but its bodies and cuts leave."""
+        return tuple(flexure for flexure in self.flexures if flexure.found)
 
     @property
     def width_error(self) -> float:
@@ -303,7 +303,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         inside = np.array([flexure.point_mm(0.0, s * t * 0.49) for s in (-1.0, 0.0, 1.0)]).T
         beside = np.array([flexure.point_mm(0.0, s * (0.5 * t + 1e-3 * t)) for s in (-1.0, 1.0)]).T
         # A flexure that is cut from a body must have had material beside its neck before the cut.
-        cuts = flexure.kind in ("leaf", "strip") or uncut.holds(beside).all()
+        cuts = flexure.kind == "leaf" or flexure.found or uncut.holds(beside).all()
         if not region.holds(inside).all() or region.holds(beside).any() or not cuts:
             raise DataError(
                 f"flexure {flexure.name} of {name} must have a thickness of {t:g} mm at ({flexure.at_mm[0]:g}, "
@@ -313,7 +313,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         if flexure.kind == "leaf":
             others = [other for other in mechanism.flexures if other is not flexure and mechanism.fused]
             _check_leaf(flexure, region, uncut, others, name)
-        elif flexure.is_notch and any(_is_hole(loop.area_mm2, flexure) for loop in region.loops):
+        elif flexure.is_notch and not flexure.found and any(_is_hole(loop.area_mm2, flexure) for loop in region.loops):
             raise DataError(
                 f"The cuts of flexure {flexure.name} of {name} must reach the outer edges of the body, but an "
                 f"ellipse of {flexure.half_length_mm:g} by {flexure.depth_mm:g} mm lies wholly inside it, as a closed "

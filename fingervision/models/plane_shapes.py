@@ -49,6 +49,11 @@ class Curve:
         return self.v is None
 
     @property
+    def is_hollow(self) -> bool:
+        """Whether the curve is an arc that runs clockwise, around the void, with the body on its left."""
+        return self.v is not None and float(self.u[0] * self.v[1] - self.u[1] * self.v[0]) * (self.t1 - self.t0) < 0.0
+
+    @property
     def start_mm(self) -> Array:
         """First point of the curve (mm)."""
         return self.at(np.array([self.t0]))[:, 0]

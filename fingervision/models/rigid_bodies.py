@@ -79,7 +79,7 @@ class RigidBodies(ElasticMechanism):
     def _joined(self, span: FlexureSpan) -> tuple[int, int]:
         flexure, apart = span.flexure, _BESIDE * span.flexure.thickness_mm
         ends = (span.cut_mm[0] - apart, span.cut_mm[1] + apart)
-        first, last = (self._body_of(np.array(flexure.point_mm(x, 0.0)), f"flexure {flexure.name}") for x in ends)
+        first, last = (self._body_of(np.array(flexure.section_mm(x)), f"flexure {flexure.name}") for x in ends)
         return first, last
 
     def _touching(self, face: Face) -> set[int]:
@@ -172,10 +172,10 @@ class RigidBodies(ElasticMechanism):
             parts = span.compliances(mechanism.plate_mm, mechanism.material, self.theory, width_effect=True)
             angle = np.radians(span.flexure.axis_deg)
             axes = frame_axes(np.cos(angle), np.sin(angle))
-            end = np.array(span.flexure.point_mm(float(stations[-1]), 0.0))
+            end = np.array(span.flexure.section_mm(float(stations[-1])))
             total = np.zeros((3, 3))
             for x, part in zip(stations[1:].tolist(), parts, strict=True):
-                moved = carried(end - np.array(span.flexure.point_mm(x, 0.0))) @ axes
+                moved = carried(end - np.array(span.flexure.section_mm(x))) @ axes
                 total += moved @ part @ moved.T
             found.append(
                 (
@@ -249,7 +249,7 @@ class RigidBodies(ElasticMechanism):
             pull, push, turn = joint @ apart @ moved / self.mechanism.halves
             stations = span.stations_mm(self.mechanism.plate_mm)
             angle = np.radians(span.flexure.axis_deg)
-            x, y = (np.array(part) for part in span.flexure.point_mm(stations, 0.0))
+            x, y = (np.array(part) for part in span.flexure.section_mm(stations))
             moment = turn + (x[-1] - x) * push - (y[-1] - y) * pull
             tension = np.full(stations.size - 1, pull * np.cos(angle) + push * np.sin(angle))
             rows = np.column_stack([tension, -moment[:-1], moment[1:]])
