@@ -18,6 +18,7 @@ import tempfile
 import tomllib
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -101,7 +102,7 @@ def _tried(folder: Path, python: Path, wheel: Path, constraints: Path | None, te
     programs = folder / "env" / ("Scripts" if os.name == "nt" else "bin")
     bounded = ["--constraint", constraints] if constraints else []
     what = f"fingervision[test] @ {wheel.as_uri()}" if tests else wheel
-    _run(folder, programs / "python", "-m", "pip", "install", "--quiet", "--no-compile", *bounded, what)
+    _install(folder, programs / "python", *bounded, what)
     program = programs / "fingervision"
     scale = ["--calibration", SAMPLE / "calibration.json", "--drive", SAMPLE / "drive.csv"]
     _run(folder, program, "measure", SAMPLE / "opening.mp4", *scale, "--out", "measured")
@@ -121,6 +122,14 @@ def _tried(folder: Path, python: Path, wheel: Path, constraints: Path | None, te
         )
         seen += f"; tests: {said.strip().splitlines()[-1]}"
     return seen
+
+
+def _install(folder: Path, python: Path, *what: str | Path) -> None:
+    """Install into the environment of a Python: with uv where this Python has it, which takes a tenth of pip's time."""
+    if find_spec("uv"):
+        _run(folder, sys.executable, "-m", "uv", "pip", "install", "--quiet", "--python", python, *what)
+    else:
+        _run(folder, python, "-m", "pip", "install", "--quiet", "--no-compile", *what)
 
 
 def _run(folder: Path, *command: str | Path) -> str:
