@@ -107,6 +107,12 @@ def warn(
             "flexure: move the shapes apart there, or draw the neck as a [[flexure]], as its stress is not judged.",
             err=True,
         )
+    if (stiffness := figures["input_stiffness_n_mm"]) <= 0.0:
+        click.echo(
+            f"Warning: the preload makes the stiffness at the drive negative, {stiffness:.3g} N/mm: the mechanism "
+            "stays at rest only while a stage holds its input, and moves away from there without one.",
+            err=True,
+        )
     ends = [state.input_mm for state in (states[0], states[-1])]
     if min(ends) <= figures.get("input_at_buckling_mm", np.inf) <= max(ends):
         click.echo(

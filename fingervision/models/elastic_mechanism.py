@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
+from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import PointMm
 from fingervision.domain.made_again import MadeAgain
 from fingervision.models.mechanism import Mechanism
@@ -138,18 +140,6 @@ def changes(mechanism: Mechanism, probes_by: Mapping[str, Array]) -> dict[str, A
     return found
 
 
-def observables(mechanism: Mechanism, probes_by: Mapping[str, Array]) -> dict[str, Observable]:
-    """Outputs of a modal model; the first of the k cases is 1 mm of input, the other cases are the modes."""
-    rest_mm = {
-        f"{name}_mm": float(np.hypot(*(np.array(mechanism.probes[b]) - mechanism.probes[a])))
-        for name, (a, b) in mechanism.pairs.items()
-    }
-    return {
-        name: Observable(rest_mm.get(name, 0.0), float(change[0]), change[1:])
-        for name, change in changes(mechanism, probes_by).items()
-    }
-
-
 class ElasticMechanism(MadeAgain, ABC):
     """Elastic model of a drawn mechanism.
 
@@ -219,8 +209,16 @@ class ElasticMechanism(MadeAgain, ABC):
 
     @property
     def force_error(self) -> float:
-        """Relative error of the force."""
-        return self._errors[0]
+        """Relative error of the force per input.
+
+        The change of the stiffness by a preload has the same relative error as the elastic stiffness, so that it counts
+        for more the nearer the preload comes to buckling.
+        """
+        system = self.driven
+        if system.unloaded is None:
+            return self._errors[0]
+        changed = system.unloaded.input_stiffness_n_mm / system.input_stiffness_n_mm - 1.0
+        return self._errors[0] * (1.0 + abs(changed))
 
     @property
     def stress_error(self) -> float:
@@ -239,6 +237,32 @@ class ElasticMechanism(MadeAgain, ABC):
         """
         names = [contact.name for contact in self.mechanism.contacts]
         return {n: at for n, at in zip(names, self.driven.touch_inputs_mm(), strict=True) if at is not None}
+
+    @cached_property
+    def input_at_yield_mm(self) -> float:
+        """Input nearest to rest at which the flexures yield, in small displacements.
+
+        Raises
+        ------
+        ModelError
+            If the preload alone makes them yield.
+        """
+        system, limit = self.driven, self.mechanism.material.yield_mpa
+        by_input = self.peak_stress(system.unit_displacement).mpa
+        if not np.any(system.rest_mm):
+            return limit / by_input
+        at_rest = self.peak_stress(system.rest_mm).mpa
+        if at_rest >= limit:
+            raise ModelError(
+                f"The preload of {self.mechanism.name} must leave its flexures below the yield stress of {limit:g} "
+                f"MPa, but stresses them by {at_rest:.4g} MPa; press less."
+            )
+        farthest = (limit + at_rest) / by_input
+
+        def over(input_mm: float) -> float:
+            return self.peak_stress(system.rest_mm + input_mm * system.unit_displacement).mpa - limit
+
+        return min((float(brentq(over, 0.0, sign * farthest)) for sign in (1.0, -1.0)), key=abs)
 
     def state(self, input_mm: float, *, large_rotation: bool = False, contact: bool = False) -> MechanismState:
         """Find the equilibrium at one input."""
@@ -268,7 +292,7 @@ class ElasticMechanism(MadeAgain, ABC):
             pressed,
             self.poses(moved, large=large),
             named_by_drive(mechanism, found.drives_n),
-            named_by_drive(mechanism, self.driven.face_motions(moved, input_mm)),
+            named_by_drive(mechanism, self.driven.face_motions(moved - self.driven.rest_mm, input_mm)),
         )
 
     def probes_mm(self, moved: Array, *, large: bool) -> dict[str, tuple[float, float]]:
@@ -339,6 +363,13 @@ class ElasticMechanism(MadeAgain, ABC):
         static = np.zeros(system.unknowns)
         static[: self.driven.unknowns] = self.driven.unit_displacement
         inertia = system.mass_t @ static
+        rest = self.state(0.0)
+        at_rest = {f"{name}_mm": length for name, length in rest.pairs_mm.items()} | {
+            f"{name}_{axis}_mm": part
+            for name, at in rest.probes_mm.items()
+            for axis, part in zip("xy", at, strict=True)
+        }
+        by_case = changes(self.mechanism, self.probes_by(np.column_stack([static, shapes])))
         return ModalModel(
             stiffness_n_mm=self.stiffness_n_mm,
             mass_t=float(static @ inertia),
@@ -346,7 +377,8 @@ class ElasticMechanism(MadeAgain, ABC):
             participation=shapes.T @ inertia,
             face_per_input=self._face_per_input,
             force_share=self._force_share,
-            observed=observables(self.mechanism, self.probes_by(np.column_stack([static, shapes]))),
+            rest_force_n=rest.force_n,
+            observed={name: Observable(at_rest[name], float(by[0]), by[1:]) for name, by in by_case.items()},
         )
 
     @property

@@ -80,6 +80,9 @@ class Drive:
     force_n_per_input : float or None
         Force of the actuator at rest per unit of input, for an actuator that prescribes a force (a voice coil, a
         weight); None for one that prescribes a motion. With a stiffness, the force decreases by it as the face moves.
+    preload_n : float
+        Force along `direction` with which the actuator presses on the face at rest, before its input: inputs are
+        counted from where the mechanism then is.
     """
 
     face: Face
@@ -89,6 +92,7 @@ class Drive:
     turns: Literal["held", "free"] = "held"
     stiffness_n_mm: float | None = None
     force_n_per_input: float | None = None
+    preload_n: float = 0.0
 
     @property
     def is_soft(self) -> bool:
@@ -115,6 +119,8 @@ class Drive:
             actuator = f" A unit of input is a force of {force:g} N on the face{less}."
         elif stiff is not None:
             actuator = f" The input is the actuator's own motion, behind a stiffness of {stiff:g} N/mm."
+        if self.preload_n:
+            actuator += f" At rest it presses with {self.preload_n:g} N: inputs are counted from there."
         if self.face.is_pin:
             slides = "may slide" if self.across == "free" else "cannot slide"
             x, y = self.face.middle_mm

@@ -2,7 +2,7 @@
 
 from bisect import insort
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -176,6 +176,12 @@ class DrivenMechanism:
         faces nothing) and their derivatives.
     actuators : Actuators or None
         Actuators of the drives; None where every drive is a stage.
+    rest_mm : ndarray of float, shape (unknowns,) or (1,)
+        Displacements under the preload of the drives, from which all other displacements are counted.
+    rest_faces_mm, preload_n : ndarray of float, shape (drives,) or (1,)
+        Motion of every driven face by the preload, and force of every drive at rest, along its direction.
+    unloaded : DrivenMechanism or None
+        The system without its preload; None where there is none.
     """
 
     name: str
@@ -187,6 +193,66 @@ class DrivenMechanism:
     mass: Callable[[], csr_matrix]
     gaps: Pairs = ()
     actuators: Actuators | None = None
+    rest_mm: Array = field(default_factory=lambda: np.zeros(1))
+    rest_faces_mm: Array = field(default_factory=lambda: np.zeros(1))
+    preload_n: Array = field(default_factory=lambda: np.zeros(1))
+    unloaded: "DrivenMechanism | None" = None
+
+    def preloaded(self, rows: Array, preload_n: Array) -> "DrivenMechanism":
+        """Return the system about its equilibrium under forces that press on its driven faces, in the deformed shape.
+
+        The faces that are pressed are free to move along their drives until equilibrium is reached; from there on they
+        move as their drives do. The stress of the preload adds its geometric stiffness to every result.
+
+        Parameters
+        ----------
+        rows : ndarray of float, shape (unknowns, drives)
+            Weights of the unknowns in the motion of every driven face.
+        preload_n : ndarray of float, shape (drives,)
+            Force along every drive.
+
+        Raises
+        ------
+        ModelError
+            If there is no stable equilibrium, because the preload buckles the mechanism.
+        """
+        motions = csr_matrix(hstack([self.motions, csr_matrix(self.by_drive[:, preload_n != 0.0])]))
+        load, rest_mm = rows @ preload_n, np.zeros(self.unknowns)
+        for step in range(1, _LOAD_STEPS + 1):
+            share = step / _LOAD_STEPS
+            for _ in range(_NEWTON_STEPS):
+                tangent, force = self.tangent(rest_mm)
+                apart = motions.T @ (force - share * load)
+                solver = factorised(motions.T @ tangent @ motions)
+                is_held = bool(np.abs(apart).max() <= _RESIDUAL * np.abs(motions.T @ load).max())
+                if is_held or not np.all(np.isfinite(apart)):
+                    break
+                rest_mm = rest_mm - motions @ solver.solve(apart)
+            # The pivots of a symmetric matrix have the signs of its eigenvalues (Sylvester's law of inertia).
+            if not is_held or solver.U.diagonal().min() <= 0.0:
+                words = " and ".join(f"{force_n:g} N" for force_n in preload_n[preload_n != 0.0].tolist())
+                raise ModelError(
+                    f"{self.name} must carry its preload of {words}, but buckles or yields freely between "
+                    f"{100.0 * (share - 1.0 / _LOAD_STEPS):g} and {100.0 * share:g} % of it; press less, or make the "
+                    "flexures that it presses thicker or shorter."
+                )
+
+        def tangent_there(moved: Array) -> tuple[csr_matrix, Array]:
+            stiffness, force = self.tangent(rest_mm + moved)
+            return stiffness, force - load
+
+        def shifted(gaps: Callable[[Array], Gaps]) -> Callable[[Array], Gaps]:
+            return lambda moved: gaps(rest_mm + moved)
+
+        return replace(
+            self,
+            tangent=tangent_there,
+            internal=lambda moved: self.internal(rest_mm + moved) - load,
+            gaps=tuple(shifted(gaps) for gaps in self.gaps),
+            rest_mm=rest_mm,
+            rest_faces_mm=rows.T @ rest_mm,
+            preload_n=preload_n,
+        )
 
     def actuated(self, actuators: Actuators, soft: Flags) -> "DrivenMechanism":
         """Return the system with some drives moved by soft actuators, so that their faces are free to move.
@@ -224,7 +290,7 @@ class DrivenMechanism:
         return csr_matrix(self.stiffness_n_mm - rows @ diags(self.actuators.spring_n_mm) @ rows.T)
 
     def drive_forces_n(self, settings: Array, moved: Array, loads_n: Array) -> Array:
-        """Force at every drive, from the inputs, displacements, and internal forces less all loads on the body."""
+        """Force at every drive without its preload, from inputs, displacements, and internal forces less all loads."""
         forces = np.asarray(self.by_drive.T @ loads_n)
         return forces if self.actuators is None else forces + self.actuators.forces_n(settings, moved)
 
@@ -315,8 +381,13 @@ class DrivenMechanism:
         """Small displacements per 1 mm of each driven face, with the other driven faces at rest, without contact."""
         pairs = zip(self.unit_by_drive.T, self.drive_stiffness_n_mm.T, strict=True)
         return tuple(
-            MechanismEquilibrium(moved, float(forces[i]), forces, ()) for i, (moved, forces) in enumerate(pairs)
+            replace(self._state(moved, forces), force_n=float(forces[i])) for i, (moved, forces) in enumerate(pairs)
         )
+
+    def _state(self, moved: Array, drives_n: Array, pressed_n: tuple[Array, ...] = ()) -> MechanismEquilibrium:
+        """State with the preload, from displacements and forces that are counted from rest."""
+        drives_n = drives_n + self.preload_n
+        return MechanismEquilibrium(self.rest_mm + moved, float(self.per_input @ drives_n), drives_n, pressed_n)
 
     def under_load(self, load_n: Array) -> Array:
         """Small displacements under one load, or under each column of loads, with the drive fixed."""
@@ -404,10 +475,11 @@ class DrivenMechanism:
         gaps = self.gaps if contact else ()
         if large_rotation:
             return self._followed(input_mm, gaps)
-        moved, pressed = input_mm * self.unit_displacement, ()
+        moved = input_mm * self.unit_displacement
         if not gaps:
-            drives = self.drive_stiffness_n_mm @ self.per_input * input_mm
-            return MechanismEquilibrium(moved, self.input_stiffness_n_mm * input_mm, drives, pressed)
+            found = self._state(moved, self.drive_stiffness_n_mm @ self.per_input * input_mm)
+            at_rest = float(np.sum(self.per_input * self.preload_n))
+            return replace(found, force_n=at_rest + self.input_stiffness_n_mm * input_mm)
         gap, slope, by_force = self._touching
         apart, facing = gap + slope @ moved - between[0], np.isfinite(gap)
         forces = np.zeros(gap.size)
@@ -417,7 +489,7 @@ class DrivenMechanism:
             moved = moved + by_force @ forces
         settings = self.per_input * input_mm
         drives = self.drive_forces_n(settings, moved, self.stiffness_n_mm @ moved - slope.T @ forces)
-        return MechanismEquilibrium(moved, float(self.per_input @ drives), drives, self._by_pair(forces))
+        return self._state(moved, drives, self._by_pair(forces))
 
     @cached_property
     def _touching(self) -> tuple[Array, Array, Array]:
@@ -467,8 +539,7 @@ class DrivenMechanism:
         moved, pressed = path[-1].moved, path[-1].pressed
         loads = self.internal(moved) - self._all_gaps(pairs, moved)[1].T @ pressed
         drives = self.drive_forces_n(self.per_input * input_mm, moved, loads)
-        by_pair = self._by_pair(pressed) if pairs else ()
-        return MechanismEquilibrium(moved, float(self.per_input @ drives), drives, by_pair)
+        return self._state(moved, drives, self._by_pair(pressed) if pairs else ())
 
     @cached_property
     def _known(self) -> dict[tuple[bool, bool], list["_Reached"]]:
@@ -490,7 +561,7 @@ class DrivenMechanism:
         """
         at_mm = guess_mm
         for _ in range(_NEWTON_STEPS):
-            moved = self._followed(at_mm, ()).displacement
+            moved = self._followed(at_mm, ()).displacement - self.rest_mm
             gap, slope, _ = self._all_gaps(self.gaps, moved)
             place = int(np.argmin(gap))
             if abs(gap[place]) < _TOUCHES * abs(guess_mm):
@@ -532,7 +603,9 @@ class DrivenMechanism:
     ) -> tuple[Array, Array] | None:
         """Newton's method for a given set of touching nodes; returns None if it does not converge."""
         motions = self.motions
+        # Beside a preload, the rounding errors are those of its forces.
         scale = float(np.abs(self.stiffness_n_mm @ self.unit_displacement).max()) * abs(input_mm)
+        scale += float(np.abs(self.preload_n).max())
         solver, before = None, np.inf
         pushed = self.load_by_drive @ (self.per_input * input_mm)
         for _ in range(_NEWTON_STEPS):

@@ -105,7 +105,7 @@ def driven_components(drive: Drive) -> tuple[str, ...]:
 
 
 def with_actuators(system: DrivenMechanism, rows: Array, mechanism: Mechanism) -> DrivenMechanism:
-    """Add the soft actuators of a drawing, if any, to the equations of its driven faces.
+    """Add the preloads and the soft actuators of a drawing, if any, to the equations of its driven faces.
 
     Parameters
     ----------
@@ -115,8 +115,18 @@ def with_actuators(system: DrivenMechanism, rows: Array, mechanism: Mechanism) -
         Weights of the unknowns in the motion of every driven face along its direction.
     mechanism : Mechanism
         The drawing.
+
+    Raises
+    ------
+    ModelError
+        If the mechanism gives way under its preload.
     """
     drives = mechanism.drives
+    preload_n = np.array([drive.preload_n for drive in drives])
+    if preload_n.any():
+        bare = replace(mechanism, drives=tuple(replace(drive, preload_n=0.0) for drive in drives))
+        pressed = with_actuators(system.preloaded(rows, preload_n), rows, bare)
+        return replace(pressed, unloaded=with_actuators(system, rows, bare))
     soft = np.array([drive.is_soft for drive in drives])
     if not soft.any():
         return system

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import ModelError
+from fingervision.models.elastic_mechanism import named_by_drive
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import Part
 from fingervision.models.lumped import MechanismFrame
@@ -168,9 +169,12 @@ class GrippedPair:
         free_mm = self.rest_mm + self.per_input * input_mm
         pressed_mm = max(part.width_mm - free_mm, 0.0)
         grip = pressed_mm / (self.compliance_mm_n + 1.0 / part.stiffness_n_mm)
-        moved = input_mm * model.driven.unit_displacement + grip * self._pushed
-        force = model.stiffness_n_mm * input_mm + grip * self._force_per_grip
-        return PairGrip(input_mm, free_mm + grip * self.compliance_mm_n, grip, force, model.peak_stress(moved).mpa)
+        free = model.driven.equilibrium(input_mm)
+        force, stress = (
+            free.force_n + grip * self._force_per_grip,
+            model.peak_stress(free.displacement + grip * self._pushed),
+        )
+        return PairGrip(input_mm, free_mm + grip * self.compliance_mm_n, grip, force, stress.mpa)
 
 
 MechanismModel = MechanismPlate | MechanismFrame | RigidBodies
@@ -198,18 +202,22 @@ def response_figures(model: MechanismModel) -> dict[str, float]:
     dict of str to float
         Numbers by name, with the unit at the end of the name.
     """
-    unit, rest = model.state(1.0), model.state(0.0)
+    unit, rest, system = model.state(1.0), model.state(0.0), model.driven
     figures = {"input_stiffness_n_mm": model.stiffness_n_mm}
     if isfinite(unit.stress_mpa):
-        figures |= {
-            "peak_stress_mpa_per_mm": unit.stress_mpa,
-            "input_at_yield_mm": model.mechanism.material.yield_mpa / unit.stress_mpa,
-        }
-    for name, (x, y) in unit.probes_mm.items():
-        figures[f"{name}: x per input [mm/mm]"] = x
-        figures[f"{name}: y per input [mm/mm]"] = y
+        figures["peak_stress_mpa_per_mm"] = model.peak_stress(system.unit_displacement).mpa
+        figures["input_at_yield_mm"] = model.input_at_yield_mm
+    if np.any(system.rest_mm):
+        figures |= {"preload_stress_mpa": rest.stress_mpa} if isfinite(rest.stress_mpa) else {}
+        for name, force in rest.drives_n.items():
+            figures[f"{name}: preload [N]"] = force
+        for name, sag in named_by_drive(model.mechanism, system.rest_faces_mm).items():
+            figures[f"{name}: moved by the preload [mm]"] = sag
+    for name, moved in unit.probes_mm.items():
+        for axis, end, start in zip("xy", moved, rest.probes_mm[name], strict=True):
+            figures[f"{name}: {axis} per input [mm/mm]"] = end - start
     for name, pose in unit.bodies.items():
-        figures[f"{name}: turn per input [mrad/mm]"] = pose.angle_mrad
+        figures[f"{name}: turn per input [mrad/mm]"] = pose.angle_mrad - rest.bodies[name].angle_mrad
     for name, value in unit.pairs_mm.items():
         figures[f"{name}: at rest [mm]"] = rest.pairs_mm[name]
         figures[f"{name}: per input [mm/mm]"] = value - rest.pairs_mm[name]
@@ -221,7 +229,8 @@ def response_figures(model: MechanismModel) -> dict[str, float]:
         figures |= _of_drives(model)
     for name, value in model.touch_input_mm().items():
         figures[f"{name}: input at contact [mm]"] = value
-    for held, label in ((False, "drive_free"), (True, "drive_held")):
+    # Where the preload makes the drive's stiffness negative, a free drive does not vibrate, but moves away.
+    for held, label in (((False, "drive_free"),) if model.stiffness_n_mm > 0.0 else ()) + ((True, "drive_held"),):
         for place, value in enumerate(model.modes_hz(drive_held=held), 1):
             figures[f"mode_{place}_{label}_hz"] = value
     return figures
@@ -257,21 +266,25 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
         if abs(buckles) < figures.get("input_at_yield_mm", 0.0):
             figures["input_at_buckling_mm"] = buckles
         figures |= operating_figures_of(model)
-        across = out_of_plane(model.mechanism)
-        figures["first_out_of_plane_mode_hz"] = across.modes_hz[0]
-        figures |= {f"{name}: sag out of the plane [mm]": value for name, value in across.sag_mm.items()}
-        errors |= {"model_error_out_of_plane_percent": 100.0 * MODE_ERROR, "model_error_sag_percent": 100.0 * SAG_ERROR}
+        if not np.any(model.driven.rest_mm):  # the preload also changes the stiffness out of the plane
+            across = out_of_plane(model.mechanism)
+            figures["first_out_of_plane_mode_hz"] = across.modes_hz[0]
+            figures |= {f"{name}: sag out of the plane [mm]": value for name, value in across.sag_mm.items()}
+            errors["model_error_out_of_plane_percent"] = 100.0 * MODE_ERROR
+            errors["model_error_sag_percent"] = 100.0 * SAG_ERROR
     return figures | errors
 
 
 def _of_drives(model: MechanismModel) -> dict[str, float]:
     """Response to each of several driven faces, with the other faces at rest, and the face's share of the force."""
     together, rest = model.state(1.0), model.state(0.0)
-    figures = {f"{name}: force per input [N/mm]": force for name, force in together.drives_n.items()}
+    figures = {f"{name}: force per input [N/mm]": n - rest.drives_n[name] for name, n in together.drives_n.items()}
     for name, alone in zip(together.drives_n, model.drive_states(), strict=True):
-        figures |= {f"{other}: force per mm of {name} [N/mm]": force for other, force in alone.drives_n.items()}
+        for other, force in alone.drives_n.items():
+            figures[f"{other}: force per mm of {name} [N/mm]"] = force - rest.drives_n[other]
         for probe, moved in alone.probes_mm.items():
-            figures |= {f"{probe}: {axis} per mm of {name} [mm/mm]": m for axis, m in zip("xy", moved, strict=True)}
+            for axis, end, start in zip("xy", moved, rest.probes_mm[probe], strict=True):
+                figures[f"{probe}: {axis} per mm of {name} [mm/mm]"] = end - start
         for pair, length in alone.pairs_mm.items():
             figures[f"{pair}: per mm of {name} [mm/mm]"] = length - rest.pairs_mm[pair]
     return figures

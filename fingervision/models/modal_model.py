@@ -71,6 +71,8 @@ class ModalModel:
     force_share : float
         Share of the vibration's inertia that acts on the drive: 1 for a stage and for an actuator with a stiffness, 0
         for one that prescribes the force.
+    rest_force_n : float
+        Force at the drive at zero input: its preload.
     """
 
     stiffness_n_mm: float
@@ -80,6 +82,7 @@ class ModalModel:
     observed: Mapping[str, Observable]
     face_per_input: float = 1.0
     force_share: float = 1.0
+    rest_force_n: float = 0.0
 
     @property
     def modes_hz(self) -> Array:
@@ -199,7 +202,8 @@ def modal_motion(model: ModalModel, drive: DriveHistory, damping: Damping | None
     static = {name: seen.rest_mm + seen.per_input * inputs for name, seen in model.observed.items()}
     observed = {name: static[name] + coordinate @ seen.by_mode for name, seen in model.observed.items()}
     inertia = model.force_share * (acceleration @ model.participation)
-    return Motion(drive, observed, static, model.stiffness_n_mm * inputs + inertia, inertia, ratios, model.modes_hz)
+    force = model.rest_force_n + model.stiffness_n_mm * inputs + inertia
+    return Motion(drive, observed, static, force, inertia, ratios, model.modes_hz)
 
 
 def run_rows(drive: DriveHistory) -> list[slice]:

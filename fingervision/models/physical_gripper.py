@@ -184,10 +184,10 @@ class MechanismModelOfGap:
             raise UsageError(f"The kind of model must be {', '.join(MECHANISM_MODELS)}, but is {kind}.")
         model = MECHANISM_MODELS[kind](mechanism)
         self._model = model
-        state = model.state(1.0)
+        state, rest = model.state(1.0), model.state(0.0)
         # Without a stress, the range is a hundredth of the size, as for a gripper whose fingers never touch.
         limit = 0.01 * mechanism.region.size_mm
-        reach = mechanism.material.yield_mpa / state.stress_mpa if isfinite(state.stress_mpa) else limit
+        reach = abs(model.input_at_yield_mm) if isfinite(state.stress_mpa) else limit
         touches = [at for at in model.touch_input_mm().values() if abs(at) < reach]
         self.input_range_mm = (
             max([-reach, *(at for at in touches if at < 0.0)]),
@@ -195,17 +195,17 @@ class MechanismModelOfGap:
         )
         first, last = mechanism.pairs[GAP]
         apart = np.subtract(mechanism.probes[last], mechanism.probes[first])
-        self._rest_mm = float(np.hypot(*apart))
-        way = apart / self._rest_mm
-        self._left = float(np.dot(state.probes_mm[first], way))
-        self._right = float(np.dot(state.probes_mm[last], way))
-        self._force_n = state.force_n
+        self._rest_mm, way = rest.pairs_mm[GAP], apart / np.hypot(*apart)
+        self._left, self._right = (
+            float(np.subtract(state.probes_mm[name], rest.probes_mm[name]) @ way) for name in (first, last)
+        )
+        self._force_n = rest.force_n, state.force_n - rest.force_n
 
     def respond(self, input_mm: Array) -> Response:
         """Compute the response for small displacements; the midline is zero at zero input."""
         u = np.asarray(input_mm, dtype=float)
         half = 0.5 * self._rest_mm
-        return Response(-half + self._left * u, half + self._right * u, self._force_n * u)
+        return Response(-half + self._left * u, half + self._right * u, self._force_n[0] + self._force_n[1] * u)
 
     @cached_property
     def places(self) -> PlaceAnswers:

@@ -91,6 +91,10 @@ class PlaceAnswers:
 
     def __init__(self, mechanism: Mechanism, model: MechanismFrame | None = None) -> None:
         self.mechanism = mechanism
+        if any(drive.preload_n for drive in mechanism.drives):
+            raise ModelError(
+                f"Changed places of {mechanism.name} are computed without preload of its drives: leave out preload_n."
+            )
         self.model = model or MechanismFrame(mechanism)
         self._make_observers()
 

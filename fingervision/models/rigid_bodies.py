@@ -63,6 +63,11 @@ class RigidBodies(ElasticMechanism):
         self._joins = [self._joined(span) for span in spans]
         # Bodies are rigid, so that a leaf bends over its whole free length.
         self.spans = [span if span.flexure.is_notch else replace(span, cut_mm=span.free_mm) for span in spans]
+        if pressed := [drive.face.name for drive in mechanism.drives if drive.preload_n]:
+            raise ModelError(
+                f"The stiffness matrix does not change with the preload of {pressed[0]} of {mechanism.name}; take "
+                "--kind lumped or finite_element."
+            )
         driven = [self._only(drive.face) for drive in mechanism.drives]
         if len(set(driven)) < len(driven):
             raise ModelError(

@@ -166,6 +166,9 @@ class DriveTable:
             above=0.0,
         ),
     ] = None  # fmt: skip
+    preload_n: Annotated[
+        float, Field("force on the face at rest, along the direction, from where inputs are counted; 0 by default", "N")
+    ] = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -521,7 +524,8 @@ def _drive(section: Section, table: DriveTable, name: str) -> Drive:
     across: Any = table.across  # words that their fields allow
     turns: Any = table.turns or (across if table.pin_mm is None else "free")
     face = _driven(section, table, name, turns)
-    return Drive(face, way, across, table.per_input, turns, table.stiffness_n_mm, table.force_n_per_input)
+    soft = table.stiffness_n_mm, table.force_n_per_input
+    return Drive(face, way, across, table.per_input, turns, *soft, table.preload_n)
 
 
 def _driven(section: Section, table: DriveTable, name: str, turns: str) -> Face:
