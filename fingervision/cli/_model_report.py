@@ -81,6 +81,13 @@ def say_drawing(mechanism: Mechanism) -> None:
         )
     for leaf, other, (x, y) in mechanism.fused:
         click.echo(f"The leaves {leaf} and {other} cross at ({x:.4g}, {y:.4g}) mm, where they are one piece.")
+    if mechanism.layers:
+        each = zip(mechanism.body_names, mechanism.layers, strict=True)
+        names = sorted({name or "a body without a name" for name, own in each if len(own) > 1})
+        click.echo(
+            f"The layers {', '.join(map(str, mechanism.by_layer))}, each {mechanism.plate_mm:g} mm thick, are joined "
+            f"only by {', '.join(names)}."
+        )
     for drive in mechanism.drives:
         click.echo(drive.words)
 
@@ -101,7 +108,12 @@ def warn(
             "there as a [[flexure]].",
             err=True,
         )
-    for (x, y), thickness in necks_of(mechanism.region, mechanism.flexures)[:_MOST_NECKS]:
+    necks = [
+        neck
+        for layer, region in mechanism.by_layer.items()
+        for neck in necks_of(region, [flexure for flexure in mechanism.flexures if flexure.layer == layer])
+    ]
+    for (x, y), thickness in necks[:_MOST_NECKS]:
         click.echo(
             f"Warning: the drawing is only {thickness:.3g} mm thick at ({x:.4g}, {y:.4g}) mm, where it names no "
             "flexure: move the shapes apart there, or draw the neck as a [[flexure]], as its stress is not judged.",

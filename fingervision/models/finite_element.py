@@ -86,6 +86,11 @@ class MechanismPlate(ElasticMechanism):
     ) -> None:
         super().__init__(mechanism)
         self._width_effect = width_effect
+        if mechanism.layers:
+            raise ModelError(
+                f"{mechanism.name} has several layers, but finite elements mesh one: take --kind lumped or "
+                "stiffness_matrix."
+            )
         region = mechanism.region
         check_mechanism(mechanism, region)
         self._size_mm = region.size_mm

@@ -190,6 +190,8 @@ class Flexure:
         -1 for a notch whose right face, seen along the axis, is cut and whose left one is straight; 0 for equal faces.
     found : bool
         Whether the bodies and cuts of the drawing leave the flexure, which then adds and removes nothing (`strips`).
+    layer : int
+        Number of the layer in which the flexure lies.
     used : (float, float, float) or None
         Shares of the flexure's strain energy from three deformations: ends that rotate against each other, ends that
         sway, and elongation. None where the shares are unknown.
@@ -205,6 +207,7 @@ class Flexure:
     fillet_mm: float = 0.0
     lean: float = 0.0
     found: bool = False
+    layer: int = 1
     used: tuple[float, float, float] | None = None
 
     def point_mm(self, along: Any, across: Any) -> tuple[Any, Any]:
@@ -341,7 +344,11 @@ def fused(flexures: Sequence[Flexure]) -> tuple[tuple[Flexure, ...], tuple[tuple
     for place, leaf in enumerate(flexures):
         stops = [-leaf.half_length_mm, leaf.half_length_mm]
         for number, other in enumerate(flexures):
-            if leaf.kind == other.kind == "leaf" and (at := leaf.crosses(other)) is not None:
+            if (
+                leaf.kind == other.kind == "leaf"
+                and leaf.layer == other.layer
+                and (at := leaf.crosses(other)) is not None
+            ):
                 stops.append(at)
                 if number > place:
                     crossings.append((leaf.name, other.name, leaf.point_mm(at, 0.0)))

@@ -22,6 +22,7 @@ from fingervision.models.flexure_stress import nominal_stress
 from fingervision.models.gripper_mechanism import half_mechanism
 from fingervision.models.gripper_model import DrawnGripper, ModelErrors
 from fingervision.models.hinge_correction import HingeTheory
+from fingervision.models.layers import layers_at, plan_of
 from fingervision.models.mechanism import Mechanism, check_mechanism
 from fingervision.models.mechanism_bodies import BodyPose, plate_poses
 from fingervision.models.mechanism_equilibrium import DrivenMechanism, Gaps
@@ -94,6 +95,10 @@ cuts, wide plates). The stress is too low by 0.3 sqrt(t / R), because its peak i
 _ONE_SIDED = 0.07
 """Relative error of the force because a notch is cut from one side only: its beam, a notch of half the depth on both
 sides, is 1 to 6.5 % too stiff for t / R of 0.025 to 0.4 (`tests/models/test_found_notches.py`)."""
+_ROOT_IN_LAYERS = 1.2
+"""Relative error of the force, over thickness / length of a leaf, because a body of several layers yields at the leaf's
+root as if the leaf were as wide: two stages on such a ground are 0.6 t / L stiffer than each on its own, for one root
+(`tests/models/test_layers.py`)."""
 _TINIEST = 1e-300
 _LEAST_OWN = 3
 """Own modes of every body with which its first mode is computed."""
@@ -137,7 +142,8 @@ class MechanismFrame(ElasticMechanism):
             raise ModelError(
                 f"{mechanism.name} must have flexures to be a lumped model, but has none; take --kind finite_element."
             )
-        self.spans = tuple(span_of(flexure, region) for flexure in mechanism.flexures)
+        by_layer = mechanism.by_layer
+        self.spans = tuple(span_of(flexure, by_layer[flexure.layer]) for flexure in mechanism.flexures)
         for drive in mechanism.drives:
             middle = np.array(drive.face.middle_mm)[:, None]
             on = [span.flexure.name for span in self.spans if drive.face.is_pin and span.slab.holds(middle)[0]]
@@ -146,9 +152,13 @@ class MechanismFrame(ElasticMechanism):
                     f"pin {drive.face.name} of {mechanism.name} must lie on a body to be driven in a lumped model, but "
                     f"lies on flexure {on[0]}; take --kind finite_element."
                 )
-        cut = PlanarRegion((*region.steps, *((False, span.slab) for span in self.spans)), region.marks_mm)
-        self._mesh = mesh or triangulate(cut, _ACROSS, _BODY * region.size_mm)
         self._size_mm = region.size_mm
+        self._layers: tuple[Array | None, NDArray[np.int64] | None] = (None, None)
+        if mechanism.layers:
+            self._mesh, self._layers = self._meshed_in_layers(region)
+        else:
+            cut = PlanarRegion((*region.steps, *((False, span.slab) for span in self.spans)), region.marks_mm)
+            self._mesh = mesh or triangulate(cut, _ACROSS, _BODY * region.size_mm)
         self._assemble()
         if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures):
             # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
@@ -164,12 +174,26 @@ class MechanismFrame(ElasticMechanism):
             del self.driven
             self._assemble()
 
+    def _meshed_in_layers(self, region: PlanarRegion) -> tuple[PlaneMesh, tuple[Array, NDArray[np.int64]]]:
+        """Triangles of all bodies, each alone, with the number of layers and of the body at every triangle."""
+        nodes: list[Array] = []
+        triangles, layers = [], []
+        for body in self.bodies:
+            mesh = triangulate(plan_of(body.sheets, region.marks_mm), _ACROSS, _BODY * region.size_mm)
+            triangles.append(mesh.triangles + sum(part.shape[1] for part in nodes))
+            nodes.append(mesh.nodes_mm)
+            corners = mesh.nodes_mm[:, mesh.triangles[:3]]
+            layers.append(layers_at(body.sheets, self.mechanism.joints, corners, self.mechanism.name))
+        sizes = [part.size for part in layers]
+        whole = PlaneMesh(np.concatenate(nodes, axis=1), np.concatenate(triangles, axis=1))
+        return whole, (np.concatenate(layers), np.repeat(np.arange(len(sizes)), sizes))
+
     def _assemble(self) -> None:
         mechanism = self.mechanism
         zones = tuple(f.zone(mechanism.plate_mm) for f in mechanism.flexures if not f.is_notch)
         used = zones if self._width_effect else ()
         thick_mm = mechanism.halves * mechanism.plate_mm
-        self.plate = PlaneStressPlate(self._mesh, mechanism.material, thick_mm, used)
+        self.plate = PlaneStressPlate(self._mesh, mechanism.material, thick_mm, used, *self._layers)
         self.assembly = assemble_bodies(self.plate, mechanism, self.spans, self._size_mm)
         self._make_flexures()
 
@@ -288,6 +312,9 @@ class MechanismFrame(ElasticMechanism):
                 stress = max(stress, _STRESS_ONE_SIDED)
         force, stress = _FORCE_ERROR + self.mechanism.width_error, stress + self.mechanism.stress_error
         force += _ONE_SIDED * any(span.flexure.lean for span in self.spans)
+        if self.mechanism.layers:
+            leaves = [span.flexure for span in self.spans if not span.flexure.is_notch]
+            force += _ROOT_IN_LAYERS * max((leaf.thickness_mm / leaf.bent_mm for leaf in leaves), default=0.0)
         return force + _FORCE_MISUSED * misused / max(every, _TINIEST), _STRESS_ERROR + stress
 
     def _end_loads(self, moved: Array, *, large: bool) -> Array:

@@ -1,6 +1,6 @@
 """Description of a planar flexure mechanism, as given by its drawing: bodies, flexures, supports, drive, probes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import hypot, pi, sqrt
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
+from fingervision.models.layers import Joint, pieces_of
 from fingervision.models.planar_region import Loop, PlanarRegion
 from fingervision.models.plane_shapes import Shape, box, crossings
 from fingervision.models.width_effect import force_uncertainty
@@ -192,6 +193,9 @@ class Mechanism:
         Names of `bodies`, in their order; empty for a shape without one.
     fused : tuple of (str, str, (float, float))
         Leaves that cross and are one piece there: their names, and the place of the crossing.
+    layers : tuple of tuple of int
+        Numbers of the layers in which each of `bodies` lies; empty for a drawing of one layer. Every layer is as thick
+        as the plate, and parts of different layers are joined only by bodies that lie in both.
     mirrored : bool
         Whether bodies, flexures and faces are the right half of a mechanism whose left half is its mirror image in the
         line x = 0. Forces of drives are those of both halves; a probe with x < 0 lies on the left half.
@@ -211,6 +215,7 @@ class Mechanism:
     body_names: tuple[str, ...] = ()
     fused: tuple[tuple[str, str, PointMm], ...] = ()
     mirrored: bool = False
+    layers: tuple[tuple[int, ...], ...] = ()
 
     @property
     def halves(self) -> float:
@@ -252,8 +257,28 @@ class Mechanism:
         return 0.5 * self.material.poisson_ratio**2 * apart
 
     @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Bodies that lie in several layers, each with its layers."""
+        each = zip(self.bodies, self.layers, strict=False)
+        return tuple((shape, numbers) for (added, shape), numbers in each if added and len(numbers) > 1)
+
+    @property
+    def by_layer(self) -> dict[int, PlanarRegion]:
+        """The region of every layer, by its number; of a drawing of one layer, the whole."""
+        if not self.layers:
+            return {1: self.region}
+        whole, found = self.region, {}
+        for layer in sorted(
+            {number for numbers in self.layers for number in numbers} | {f.layer for f in self.flexures}
+        ):
+            bodies = [step for step, numbers in zip(self.bodies, self.layers, strict=True) if layer in numbers]
+            own = [step for flexure in self.flexures if flexure.layer == layer for step in flexure.steps()]
+            found[layer] = PlanarRegion((*bodies, *own), whole.marks_mm)
+        return found
+
+    @property
     def region(self) -> PlanarRegion:
-        """The body: shapes and flexures, with corners where faces begin and end."""
+        """The body: shapes and flexures of all layers, with corners where faces begin and end."""
         steps = (*self.bodies, *(step for flexure in self.flexures for step in flexure.steps()))
         faces = [*self.fixed, *(face for face, _ in self.slides), *(drive.face for drive in self.drives)]
         faces += [face for contact in self.contacts for face in (contact.face, contact.other) if face is not None]
@@ -294,18 +319,21 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             f"{name} must be {_SIZES_MM[0]:g} to {_SIZES_MM[1]:g} mm large, but its bodies are {size:.3g} mm across; "
             f"are its lengths {unit}."
         )
+    by_layer = mechanism.by_layer
     try:
-        outer = [loop for loop in region.loops if loop.area_mm2 > 0.0]
+        pieces = pieces_of(by_layer, mechanism.joints)
     except FingervisionError as error:
         raise DataError(f"In {name}: {error}") from error
+    outer = [piece[0].part.outline for piece in pieces]
     if len(outer) != 1:
         raise DataError(
             f"The bodies of {name} must form one connected piece, but form {len(outer)}: {_pieces(mechanism, outer)}; "
             "let bodies and flexures overlap, and let no cut separate them."
         )
-    uncut = PlanarRegion(mechanism.bodies)
+    numbers = mechanism.layers or ((1,),) * len(mechanism.bodies)
     for flexure in mechanism.flexures:
-        t = flexure.thickness_mm
+        t, region = flexure.thickness_mm, by_layer[flexure.layer]
+        uncut = PlanarRegion(tuple(b for b, own in zip(mechanism.bodies, numbers, strict=True) if flexure.layer in own))
         inside = np.array([flexure.point_mm(0.0, s * t * 0.49) for s in (-1.0, 0.0, 1.0)]).T
         beside = np.array([flexure.point_mm(0.0, s * (0.5 * t + 1e-3 * t)) for s in (-1.0, 1.0)]).T
         # A flexure that is cut from a body must have had material beside its neck before the cut.
@@ -318,6 +346,7 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
             )
         if flexure.kind == "leaf":
             others = [other for other in mechanism.flexures if other is not flexure and mechanism.fused]
+            others = [other for other in others if other.layer == flexure.layer]
             _check_leaf(flexure, region, uncut, others, name)
         elif flexure.is_notch and not flexure.found and any(_is_hole(loop.area_mm2, flexure) for loop in region.loops):
             raise DataError(
@@ -328,22 +357,29 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
     for place, flexure in enumerate(mechanism.flexures):
         for other in mechanism.flexures[:place]:
             apart = hypot(flexure.at_mm[0] - other.at_mm[0], flexure.at_mm[1] - other.at_mm[1])
-            if apart < 0.5 * (flexure.thickness_mm + other.thickness_mm):
+            if flexure.layer == other.layer and apart < 0.5 * (flexure.thickness_mm + other.thickness_mm):
                 raise DataError(
                     f"flexures {other.name} and {flexure.name} of {name} must be apart, but overlap; remove "
                     "or move one of them."
                 )
-    _check_points(mechanism, region)
+    _check_points(mechanism, mechanism.region, by_layer)
 
 
-def _check_points(mechanism: Mechanism, region: PlanarRegion) -> None:
-    """Check that probes and pins lie on the body, and that faces are finite."""
+def _check_points(mechanism: Mechanism, region: PlanarRegion, by_layer: Mapping[int, PlanarRegion]) -> None:
+    """Check that probes and pins lie on the body, in layers that are joined there, and that faces are finite."""
     name, size = mechanism.name, region.size_mm
     for probe, (x, y) in mechanism.probes.items():
         x = abs(x) if mechanism.mirrored else x
         ring = np.array([[x + 1e-6 * size * dx, y + 1e-6 * size * dy] for dx in (-1, 0, 1) for dy in (-1, 0, 1)]).T
         if not region.holds(ring).any():
             raise DataError(f"probe {probe} of {name} must lie on the body, but ({x:g}, {y:g}) mm is outside it.")
+        layers = [layer for layer, own in by_layer.items() if own.holds(ring).any()]
+        joined = any(set(layers) <= set(numbers) and shape.holds(ring).any() for shape, numbers in mechanism.joints)
+        if len(layers) > 1 and not joined:
+            raise DataError(
+                f"probe {probe} of {name} must lie on one body, but at ({x:g}, {y:g}) mm parts of the layers "
+                f"{', '.join(map(str, layers))} lie over each other."
+            )
     for drive in mechanism.drives:
         x, y = drive.face.middle_mm
         near = 1e-6 * size * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])

@@ -2,16 +2,16 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.models.flexure_span import span_of
+from fingervision.models.layers import Part, Sheet, parts_of, pieces_of, plan_of, points_in
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.planar_region import Loop, PlanarRegion
-from fingervision.models.plane_shapes import Shape
 from fingervision.models.plane_stress import PlaneStressPlate
 
 # Pose of a body: the rigid motion that fits the motions of many of its points best.
@@ -75,11 +75,6 @@ def rigid_motion(places_mm: Array, moved_mm: Array, weights: Array, about_mm: Ar
 
 Flags = NDArray[np.bool_]
 
-_CHORDS = 65
-"""Chords that replace an arc: the error of a centroid is then below 1e-5 of the arc's radius."""
-_SAMPLES = 24
-"""Test points along either side of the box round a shape, by which the piece that contains most of the shape is
-found."""
 _ON = 1e-6
 """Distance from a face's box within which the outline counts as lying on it, as a share of the drawing's size."""
 
@@ -104,6 +99,8 @@ class LinkBody:
         Outline and holes of the body, without the flexures.
     centroid_mm : ndarray of float, shape (2,)
         Centroid of the body's area, the reference point of its pose.
+    sheets : tuple of Sheet
+        Parts of the layers in which the body lies.
     """
 
     name: str
@@ -111,19 +108,20 @@ class LinkBody:
     outline: Loop
     holes: tuple[Loop, ...]
     centroid_mm: Array
+    sheets: tuple[Sheet, ...] = ()
 
-    def holds(self, points_mm: Array) -> Flags:
-        """Whether points, shape (2, n), lie in the body; arcs are replaced by their chords."""
-        inside = self.outline.holds(points_mm)
-        for hole in self.holes:
-            inside = inside & ~hole.holds(points_mm)
-        return inside
+    def holds(self, points_mm: Array, layer: int | None = None) -> Flags:
+        """Whether points, shape (2, n), lie in the body, or in its part in one layer; arcs are replaced by chords."""
+        if layer is None:
+            return Part(self.outline, self.holes).holds(points_mm)
+        own = [sheet.part.holds(points_mm) for sheet in self.sheets if sheet.layer == layer]
+        return np.asarray(np.any([np.zeros(points_mm.shape[1], dtype=bool), *own], axis=0))
 
 
 def bodies_of(mechanism: Mechanism) -> tuple[LinkBody, ...]:
     """Divide a mechanism, whose drawing is already checked, into its bodies; cached, because every model uses them."""
     region = mechanism.region
-    key = (region.steps, region.marks_mm, mechanism.flexures, mechanism.body_names, mechanism.fixed)
+    key = (region.steps, region.marks_mm, mechanism.flexures, mechanism.body_names, mechanism.fixed, mechanism.layers)
     if key not in _KEPT:
         while len(_KEPT) >= _MOST_KEPT:
             _KEPT.pop(next(iter(_KEPT)))
@@ -132,20 +130,22 @@ def bodies_of(mechanism: Mechanism) -> tuple[LinkBody, ...]:
 
 
 def _divided(mechanism: Mechanism, region: PlanarRegion) -> tuple[LinkBody, ...]:
-    spans = [span_of(flexure, region) for flexure in mechanism.flexures]
-    cut = PlanarRegion((*region.steps, *((False, span.slab) for span in spans)), region.marks_mm)
-    outer = [loop for loop in cut.loops if loop.area_mm2 > 0.0]
-    inner = [loop for loop in cut.loops if loop.area_mm2 < 0.0]
-    # A hole belongs to the smallest outline that contains the hole; loops are sorted by size.
-    points = [hole.sides_mm[0][:, [_CHORDS // 2]] for hole in inner]
-    owners = [max(n for n, loop in enumerate(outer) if loop.holds(point)[0]) for point in points]
-    names = _names(mechanism, outer)
+    by_layer = mechanism.by_layer
+    slabs = [(f.layer, span_of(f, by_layer[f.layer]).slab) for f in mechanism.flexures]
+    cut = {
+        layer: PlanarRegion((*own.steps, *((False, slab) for at, slab in slabs if at == layer)), own.marks_mm)
+        for layer, own in by_layer.items()
+    }
     found = []
-    for number, loop in enumerate(outer):
-        holes = tuple(hole for hole, owner in zip(inner, owners, strict=True) if owner == number)
-        held = any(face.holds(side, _ON * region.size_mm).any() for face in mechanism.fixed for side in loop.sides_mm)
-        found.append(LinkBody(names[number], held, loop, holes, _centroid_mm((loop, *holes))))
-    return tuple(found)
+    for sheets in pieces_of(cut, mechanism.joints):
+        parts = parts_of(plan_of(sheets, region.marks_mm)) if len(sheets) > 1 else [sheets[0].part]
+        loops = (parts[0].outline, *parts[0].holes)
+        held = any(
+            face.holds(side, _ON * region.size_mm).any() for face in mechanism.fixed for side in loops[0].sides_mm
+        )
+        found.append(LinkBody("", held, loops[0], loops[1:], _centroid_mm(loops), sheets))
+    names = _names(mechanism, [body.outline for body in found])
+    return tuple(replace(body, name=name) for body, name in zip(found, names, strict=True))
 
 
 def plate_poses(
@@ -182,9 +182,9 @@ def body_weights(plate: PlaneStressPlate, bodies: Sequence[LinkBody]) -> Mapping
     place_of[plate.x_dofs] = np.arange(plate.x_dofs.size)
     edges = place_of[plate.unknowns_of_triangles[:, 3:6]]
     found: dict[str, tuple[Array, Array]] = {}
-    for body in bodies:
+    for number, body in enumerate(bodies):
         if not body.is_fixed:
-            own = body.holds(middles)
+            own = body.holds(middles) if plate.pieces is None else plate.pieces == number
             shares = np.repeat(third[own], 3)
             weights = np.asarray(np.bincount(edges[own].ravel(), shares, plate.x_dofs.size), dtype=np.float64)
             found[body.name] = weights, body.centroid_mm
@@ -206,7 +206,7 @@ def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
     halved: dict[int, str] = {}
     for (added, shape), name in zip(mechanism.bodies, mechanism.body_names, strict=False):
         if added and name:
-            points = _points_in(shape)
+            points = points_in(shape)
             share = [int(loop.holds(points).sum()) for loop in pieces]
             mostly = 2 * max(share) > points.shape[1]
             (names if mostly else halved).setdefault(int(np.argmax(share)), column_name(name))
@@ -217,14 +217,6 @@ def _names(mechanism: Mechanism, pieces: Sequence[Loop]) -> list[str]:
         same = sum(other == name or other.startswith(f"{name}_part") for other in found)
         found.append(f"{name}_part{same + 1}" if same else name)
     return found
-
-
-def _points_in(shape: Shape) -> Array:
-    ends = np.concatenate([curve.at(np.linspace(curve.t0, curve.t1, _CHORDS)) for curve in shape.curves()], axis=1)
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    along = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
-    grid = np.stack(np.meshgrid(*(low[i] + along * (high[i] - low[i]) for i in range(2)))).reshape(2, -1)
-    return np.asarray(grid[:, shape.holds(grid)])
 
 
 def _centroid_mm(loops: Sequence[Loop]) -> Array:

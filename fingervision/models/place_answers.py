@@ -95,6 +95,10 @@ class PlaceAnswers:
             raise ModelError(
                 f"Changed places of {mechanism.name} are computed without preload of its drives: leave out preload_n."
             )
+        if mechanism.layers:
+            raise ModelError(
+                f"Changed places of {mechanism.name} are computed for a drawing of one layer, but it has more."
+            )
         self.model = model or MechanismFrame(mechanism)
         self._make_observers()
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError
-from fingervision.models.plane_shapes import Curve, Point, Polygon, Shape, crossings
+from fingervision.models.plane_shapes import Curve, Outlined, Point, Polygon, crossings
 
 Array = NDArray[np.float64]
 
@@ -75,13 +75,13 @@ class PlanarRegion:
 
     Parameters
     ----------
-    steps : tuple of (bool, Shape)
+    steps : tuple of (bool, Outlined)
         Steps in order, each (whether the shape is added, the shape).
     marks_mm : tuple of (float, float)
         Points that must be corners where they lie on the outline.
     """
 
-    steps: tuple[tuple[bool, Shape], ...]
+    steps: tuple[tuple[bool, Outlined], ...]
     marks_mm: tuple[Point, ...] = ()
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
@@ -148,7 +148,7 @@ class PlanarRegion:
 
 
 @lru_cache(maxsize=_MOST_KEPT)
-def _loops_of(steps: tuple[tuple[bool, Shape], ...], marks_mm: tuple[Point, ...]) -> tuple[Loop, ...]:
+def _loops_of(steps: tuple[tuple[bool, Outlined], ...], marks_mm: tuple[Point, ...]) -> tuple[Loop, ...]:
     """Outline of a body; cached, because every kind of model of a drawing uses it."""
     return PlanarRegion(steps, marks_mm)._traced()  # noqa: SLF001 (its own class)
 

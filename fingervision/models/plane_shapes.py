@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -306,6 +307,18 @@ class Ellipse:
 
 
 Shape = Polygon | Ellipse
+
+
+class Outlined(Protocol):
+    """Protocol of what a region is made of: a shape with its outline."""
+
+    def curves(self) -> list[Curve]:
+        """Curves of the outline."""
+        ...
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        """Whether points, shape (2, n), lie inside."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -109,12 +109,17 @@ class PlaneStressPlate:
         Thickness.
     zones : tuple of ConstrainedZone
         Flexures restrained by the plate's width; empty for plane stress everywhere.
+    layers, pieces : ndarray, shape (m,), or None
+        Number of layers, each as thick as the plate, at every triangle, and number of the body to which it belongs;
+        None for one layer.
     """
 
     def __init__(
-        self, mesh: PlaneMesh, material: Material, plate_mm: float, zones: tuple[ConstrainedZone, ...] = ()
-    ) -> None:
+        self, mesh: PlaneMesh, material: Material, plate_mm: float, zones: tuple[ConstrainedZone, ...] = (),
+        layers: Array | None = None, pieces: Indices | None = None,
+    ) -> None:  # fmt: skip
         self.material = material
+        self.pieces, self._thick_mm = pieces, plate_mm * (np.ones(1) if layers is None else layers)[:, None]
         self.plate_mm = plate_mm
         self._located: dict[tuple[float, float], tuple[Indices, Array]] = {}
         middles = mesh.nodes_mm[:, mesh.triangles[:3]].mean(axis=1)
@@ -163,7 +168,7 @@ class PlaneStressPlate:
         """Derivatives of the six shape functions at quadrature points, shape (m, q, 2, 6); weights, shape (m, q)."""
         scalar = skfem.Basis(self._mesh, skfem.ElementTriP2(), intorder=4)
         slopes = np.stack([np.asarray(shape[0].grad) for shape in scalar.basis])  # (6, 2, m, q)
-        return np.ascontiguousarray(slopes.transpose(2, 3, 1, 0)), np.asarray(scalar.dx) * self.plate_mm
+        return np.ascontiguousarray(slopes.transpose(2, 3, 1, 0)), np.asarray(scalar.dx) * self._thick_mm
 
     @cached_property
     def nodes_of_triangles(self) -> Indices:
@@ -207,7 +212,7 @@ class PlaneStressPlate:
     @cached_property
     def mass_t(self) -> csr_matrix:
         """Consistent mass matrix in tonnes, the unit consistent with N and mm."""
-        weight = self.material.density_t_mm3 * self.plate_mm
+        weight = self.material.density_t_mm3 * self._thick_mm
 
         def inertia(u: Any, v: Any, _: Any) -> Any:
             return weight * dot(u, v)

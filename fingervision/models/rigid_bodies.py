@@ -59,7 +59,8 @@ class RigidBodies(ElasticMechanism):
         self.theory, region = theory, mechanism.region
         check_mechanism(mechanism, region)
         self._size_mm, self._near_mm = region.size_mm, _ON * region.size_mm
-        spans = [span_of(flexure, region) for flexure in mechanism.flexures]
+        by_layer = mechanism.by_layer
+        spans = [span_of(flexure, by_layer[flexure.layer]) for flexure in mechanism.flexures]
         self._joins = [self._joined(span) for span in spans]
         # Bodies are rigid, so that a leaf bends over its whole free length.
         self.spans = [span if span.flexure.is_notch else replace(span, cut_mm=span.free_mm) for span in spans]
@@ -75,16 +76,18 @@ class RigidBodies(ElasticMechanism):
                 "at several faces; take --kind lumped or finite_element."
             )
 
-    def _body_of(self, point: Array, what: str) -> int:
+    def _body_of(self, point: Array, what: str, layer: int | None = None) -> int:
         for number, body in enumerate(self.bodies):
-            if body.outline.holds(point[:, None])[0]:
+            inside = body.outline.holds(point[:, None]) if layer is None else body.holds(point[:, None], layer)
+            if inside[0]:
                 return number
         raise ModelError(f"{what} of {self.mechanism.name} must lie on a body, but does not.")
 
     def _joined(self, span: FlexureSpan) -> tuple[int, int]:
         flexure, apart = span.flexure, _BESIDE * span.flexure.thickness_mm
         ends = (span.cut_mm[0] - apart, span.cut_mm[1] + apart)
-        first, last = (self._body_of(np.array(flexure.section_mm(x)), f"flexure {flexure.name}") for x in ends)
+        layer = flexure.layer if self.mechanism.layers else None
+        first, last = (self._body_of(np.array(flexure.section_mm(x)), f"flexure {flexure.name}", layer) for x in ends)
         return first, last
 
     def _touching(self, face: Face) -> set[int]:

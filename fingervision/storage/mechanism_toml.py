@@ -33,6 +33,8 @@ _QUARTER_DEG = 90.0
 _COPY = " copy"
 
 Point = tuple[float, float]
+_Step = tuple[str, tuple[bool, Shape], tuple[int, ...]]
+"""A shape that is added or removed, with its name and its layers."""
 Box = tuple[float, float, float, float]
 
 
@@ -42,6 +44,9 @@ class BodyTable:
 
     name: Annotated[str, Field("name of the body; its number by default")] = ""
     cut: Annotated[bool, Field("`true` subtracts the shape")] = False
+    in_layers: Annotated[
+        tuple[int, ...], Field("numbers of the layers in which the body lies, and which it joins; [1] by default")
+    ] = (1,)
     bar_mm: Annotated[Box | None, Field("bar: x and y of one end, and of the other end", "mm")] = None
     width_mm: Annotated[float | None, Field("width of the bar", "mm", above=0.0)] = None
     box_mm: Annotated[Box | None, Field("box: x from, x to, y from, y to", "mm")] = None
@@ -74,6 +79,7 @@ class FilletTable:
     at_mm: Annotated[Point, Field("a corner between two straight edges of the bodies, or a point near it", "mm")]
     radius_mm: Annotated[float, Field("radius that rounds the corner; a re-entrant corner is filled", "mm", above=0.0)]
     name: Annotated[str, Field("name, for a copy")] = ""
+    in_layers: Annotated[tuple[int, ...], Field("numbers of the layers in which it rounds the corner")] = (1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +113,7 @@ class FlexureTable:
         float | None, Field("of an elliptic or filleted flexure: depth of the notches", "mm", above=0.0)
     ] = None
     fillet_mm: Annotated[float | None, Field("of a filleted flexure: radius of the fillets", "mm", above=0.0)] = None
+    layer: Annotated[int, Field("number of the layer in which the flexure lies; 1 by default", low=1)] = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,11 +322,12 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
         each("flexure", _flexure), each("fixed", _face), {probe.name: probe.at_mm for probe in file.probe},
     ))  # fmt: skip
     flexures, crossings = fused(parts.flexures)
+    is_layered = {(f.layer,) for f in flexures} | {layers for _, _, layers in parts.bodies} != {(1,)}
     mechanism = Mechanism(
         name=origin if file.name is None else file.name,
         material=material,
         plate_mm=file.plate_mm,
-        bodies=tuple(body for _, body in parts.bodies),
+        bodies=tuple(body for _, body, _ in parts.bodies),
         flexures=flexures,
         fused=crossings,
         fixed=tuple(parts.fixed),
@@ -327,14 +335,16 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
         drives=tuple(each("drive", _drive)),
         probes=parts.probes,
         pairs={},
-        body_names=tuple(name for name, _ in parts.bodies),
+        body_names=tuple(name for name, _, _ in parts.bodies),
+        layers=tuple(layers for _, _, layers in parts.bodies) if is_layered else (),
         contacts=tuple(each("contact", _contact)),
     )
     if not any(drive.per_input for drive in mechanism.drives):
         raise DataError(f"At least one drive of {origin} must move with the input, but per_input is 0 for all of them.")
     mechanism.pairs.update(each("pair", lambda section, pair, _: (pair.name, _ends(section, pair, mechanism.probes))))
-    with_strips = (*mechanism.flexures, *strips_of(mechanism.region, mechanism.flexures))
-    mechanism = replace(mechanism, flexures=with_strips)
+    if not is_layered:
+        with_strips = (*mechanism.flexures, *strips_of(mechanism.region, mechanism.flexures))
+        mechanism = replace(mechanism, flexures=with_strips)
     check_material(material, origin)
     check_mechanism(mechanism, mechanism.region)
     return mechanism
@@ -363,9 +373,9 @@ def _refuse_same_names(top: Section, key: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Parts:
-    """What a [[copy]] copies: steps of bodies with their names, flexures, fixed faces and probes."""
+    """What a [[copy]] copies: steps of bodies with their names and layers, flexures, fixed faces and probes."""
 
-    bodies: list[tuple[str, tuple[bool, Shape]]]
+    bodies: list[_Step]
     flexures: list[Flexure]
     fixed: list[Face]
     probes: dict[str, Point]
@@ -374,14 +384,15 @@ class _Parts:
 def _copied(top: Section, file: MechanismFile, parts: _Parts) -> _Parts:
     """Add the fillets and the copies of a drawing to its parts."""
     for section, fillet in zip(top.tables("fillet"), file.fillet, strict=True):
-        region = PlanarRegion(tuple(step for _, step in parts.bodies))
+        own = tuple(step for _, step, layers in parts.bodies if set(fillet.in_layers) <= set(layers))
         try:
-            parts.bodies.append((fillet.name, rounded_corner(region, fillet.at_mm, fillet.radius_mm)))
+            step = rounded_corner(PlanarRegion(own), fillet.at_mm, fillet.radius_mm)
+            parts.bodies.append((fillet.name, step, fillet.in_layers))
         except DataError as error:
             section.refuse("at_mm", str(error))
     for section, table in zip(top.tables("copy"), file.copy, strict=True):
         names = [
-            *(name for name, _ in parts.bodies),
+            *(name for name, _, _ in parts.bodies),
             *(f.name for f in parts.flexures),
             *(f.name for f in parts.fixed),
             *parts.probes,
@@ -392,7 +403,7 @@ def _copied(top: Section, file: MechanismFile, parts: _Parts) -> _Parts:
             section.refuse("suffix", "must not be empty, because a copy needs a name of its own.")
         place = _map_of(section, table)
         of = table.of or names
-        bodies = [(n and n + table.suffix, (add, place.shape(s))) for n, (add, s) in parts.bodies if n in of]
+        bodies = [(n and n + table.suffix, (add, place.shape(s)), own) for n, (add, s), own in parts.bodies if n in of]
         flexures = [
             replace(f, name=f.name + table.suffix, at_mm=place.point(f.at_mm), axis_deg=place.angle_deg(f.axis_deg))
             for f in parts.flexures if f.name in of
@@ -429,15 +440,19 @@ def _moved(section: Section, face: Face, place: RigidMap, suffix: str) -> Face:
     return Face(face.name + suffix, (min(xa, xb), max(xa, xb), min(ya, yb), max(ya, yb)))
 
 
-def _body(section: Section, body: BodyTable, name: str) -> list[tuple[str, tuple[bool, Shape]]]:
+def _body(section: Section, body: BodyTable, name: str) -> list[_Step]:
     """Steps of a body, each with its name: one shape, or the outlines of a file, of which holes have no name."""
+    if not body.in_layers or min(body.in_layers) < 1 or len(set(body.in_layers)) < len(body.in_layers):
+        section.refuse(
+            "in_layers", f"must be numbers from 1, each once, such as [1, 2], but is {list(body.in_layers)}."
+        )
     given = [key for key in _SHAPES if getattr(body, key)]
     if len(given) != 1:
         section.refuse(None, f"must have exactly one of {', '.join(_SHAPES)}, but has {' and '.join(given) or 'none'}.")
     if not body.outline:
-        return [(body.name, (not body.cut, _shape(section, body, given[0])))]
+        return [(body.name, (not body.cut, _shape(section, body, given[0])), body.in_layers)]
     shapes = read_outline(section.path.parent / body.outline, body.layer, body.unit_mm)
-    return [(body.name if added else "", (added != body.cut, shape)) for added, shape in shapes]
+    return [(body.name if added else "", (added != body.cut, shape), body.in_layers) for added, shape in shapes]
 
 
 def _shape(section: Section, body: BodyTable, key: str) -> Shape:
@@ -492,7 +507,7 @@ def _flexure(section: Section, table: FlexureTable, name: str) -> Flexure:
         section.refuse("fillet_mm", f"must be at most half_length_mm and depth_mm, but is {fillet_mm:g}.")
     return Flexure(
         table.name or name.removeprefix("flexure "), kind, table.at_mm, table.axis_deg, table.thickness_mm,
-        half_length_mm, depth_mm, fillet_mm,
+        half_length_mm, depth_mm, fillet_mm, layer=table.layer,
     )  # fmt: skip
 
 

@@ -235,6 +235,8 @@ def write_outline(path: Path, mechanism: Mechanism) -> str:
         A library is not installed, or the file's ending is another one.
     """
     region, kind = PlanarRegion(mechanism.region.steps), path.suffix.lower()
+    if mechanism.layers:
+        raise UsageError(f"--export writes one layer, but {mechanism.name} has several: export a drawing of each.")
     if kind not in EXPORTS:
         raise UsageError(f"--export must name a {', '.join(EXPORTS)} file, but names {path}.")
     if kind == ".stl":
