@@ -23,12 +23,16 @@ Floats = NDArray[np.float64]
 # third of the length, up to the longest trail of which most lies within the window.
 LENGTHS_PX = np.array([0.2, 0.4, 0.6, 0.85, 1.2, 1.7, 2.4, 3.4, 4.8])
 TRIED_PX = np.concatenate((-LENGTHS_PX[::-1], (0.0,), LENGTHS_PX))
-SPACING_PX, NO_TRAIL = np.gradient(TRIED_PX), LENGTHS_PX.size
+SPACING_PX = np.gradient(TRIED_PX)
+# Lengths of which one shows at least a quarter of the gain of any other one: the effect grows with the length's cube.
+FIRST_PX, FIRST_SHARE = np.array([-2.4, -0.85, 0.0, 0.85, 2.4]), 0.25
 # Sharpening and the tails of real optics: a step with this multiple of the blur minus the step itself, as in the other
 # models of a profile.
 TAIL_BLURS = 2.2
 # Gauss-Newton steps for position and blur at each length, and least blur (pixels).
 LOOKS, LEAST_BLUR_PX = 5, 0.35
+# Length (pixels) below which a trail is none.
+SHORTEST_PX = 1e-3
 # Standard deviation of a real edge about the models, as a share of its contrast (half-pixel bins).
 DISCREPANCY = 0.004
 # Number of parameters of the model (level, contrast, tail, position, blur, length).
@@ -56,36 +60,45 @@ def with_trail(edges: EdgePoints, profiles: list[list[MeanProfile | None]], blur
         Blur of each finger's flanks (pixels).
     """
     weight = 1.0 / edges.noise_flat**2
-    lengths: list[float | None] = []
-    gains: list[float] = []
-    for (inner, outer), width in zip(profiles, blur, strict=True):
-        if inner is None or outer is None:  # one flank alone does not tell a trail from a shadow or a wall
-            lengths.append(None)
-            continue
-        # Towards the gap is outwards for the inner flank and inwards for the outer one.
-        each = np.array([trail_squares(inner, weight, width), trail_squares(outer, weight, width)[::-1]])
-        squares = each.sum(axis=0)
-        likely = np.exp(0.5 * (squares.min() - squares)) * SPACING_PX
-        lengths.append(float(likely @ TRIED_PX / likely.sum()))
-        gain = each[:, NO_TRAIL] - each[:, int(np.argmin(squares))]
-        gains.append(float(gain.sum()) if gain.min() > LEAST_SHARE * gain.sum() else -np.inf)
-    if not _is_enough(gains):
+    # One flank alone does not tell a trail from a shadow or a wall.
+    both = [
+        (inner, outer, width)
+        for (inner, outer), width in zip(profiles, blur, strict=True)
+        if inner is not None and outer is not None
+    ]
+    if not _is_enough([_gain(_both_squares(*pair, weight, FIRST_PX)) for pair in both], FIRST_SHARE):
         return None
-    known = [length for length in lengths if length is not None]
-    if len(known) < len(lengths):  # the other finger may move in the same way, or in the opposite way
-        return unsure_edges(edges, [abs(known[0])] * len(lengths), "trail")
+    seen = [_both_squares(*pair, weight, TRIED_PX) for pair in both]
+    if not _is_enough([_gain(each) for each in seen]):
+        return None
+    likely = [np.exp(0.5 * (each.sum(axis=0).min() - each.sum(axis=0))) * SPACING_PX for each in seen]
+    known = [float(own @ TRIED_PX / own.sum()) for own in likely]
+    if len(known) < len(profiles):  # the other finger may move in the same way, or in the opposite way
+        return unsure_edges(edges, [abs(known[0])] * len(profiles), "trail")
     # With their signs: optics that spread light to one side of every edge (coma) do not change the gap.
     marks = stated_marks(edges, [length / np.sqrt(3.0) for length in known])
     return replace(edges, marks=marks, beside="trail")
 
 
-def _is_enough(gains: list[float]) -> bool:
+def _both_squares(inner: MeanProfile, outer: MeanProfile, blur: float, weight: float, tried_px: Floats) -> Floats:
+    """Chi-square of both flanks for lengths towards the gap, which is outwards for the inner flank only."""
+    squares = [trail_squares(inner, weight, blur, tried_px), trail_squares(outer, weight, blur, tried_px)[::-1]]
+    return np.array(squares)
+
+
+def _gain(squares: Floats) -> float:
+    """Reduction of chi-square by a trail; none if it is not seen on both flanks."""
+    gain = squares[:, squares.shape[1] // 2] - squares[:, int(np.argmin(squares.sum(axis=0)))]
+    return float(gain.sum()) if gain.min() > LEAST_SHARE * gain.sum() else -np.inf
+
+
+def _is_enough(gains: list[float], share: float = 1.0) -> bool:
     """Whether one finger, or both together, surely have a trail, from their gains."""
-    return bool(gains) and (max(gains) > SURE_OF_ONE or sum(gains) > SURE_OF_BOTH)
+    return bool(gains) and (max(gains) > share * SURE_OF_ONE or sum(gains) > share * SURE_OF_BOTH)
 
 
-def trail_squares(profile: MeanProfile, weight: float, blur: float) -> Floats:
-    """Chi-square of a step with an exponential trail, for each of the tried lengths, in units of the least residual.
+def trail_squares(profile: MeanProfile, weight: float, blur: float, tried_px: Floats = TRIED_PX) -> Floats:
+    """Chi-square of a step with an exponential trail, for each of some lengths, in units of the least residual.
 
     Parameters
     ----------
@@ -95,21 +108,21 @@ def trail_squares(profile: MeanProfile, weight: float, blur: float) -> Floats:
         Inverse of the variance of the light of one pixel.
     blur : float
         Blur of the fitted single step (pixels).
+    tried_px : ndarray of float, shape (n,)
+        Mean lengths of the trail, positive outwards.
     """
     t, own = profile.t, DISCREPANCY * float(np.ptp(profile.light))
     root = 1.0 / np.sqrt(1.0 / (profile.count * weight) + own**2)
-    length = TRIED_PX[:, None]
-    place, width = -TRIED_PX.copy(), np.sqrt(np.maximum(blur**2 - TRIED_PX**2, (0.5 * blur) ** 2))
-    squares = np.full(TRIED_PX.size, np.inf)
+    length = tried_px[:, None]
+    place, width = -tried_px.copy(), np.sqrt(np.maximum(blur**2 - tried_px**2, (0.5 * blur) ** 2))
+    squares = np.full(tried_px.size, np.inf)
     value = root * profile.light
     for look in range(LOOKS):
         away = t - place[:, None]
         sigma = width[:, None]
-        step = _step(away, sigma, length)
-        tail = _step(away, TAIL_BLURS * sigma, length) - step
-        by_place = (_step(away + 0.01, sigma, length) - _step(away - 0.01, sigma, length)) / -0.02
-        by_width = (_step(away, 1.01 * sigma, length) - step) / (0.01 * sigma)
-        columns = root[:, None] * np.stack((np.ones_like(step), step, tail, by_place, by_width), axis=2)
+        step, slope, by_width = _step(away, sigma, length)
+        tail = _step(away, TAIL_BLURS * sigma, length)[0] - step
+        columns = root[:, None] * np.stack((np.ones_like(step), step, tail, -slope, by_width), axis=2)
         normal = np.swapaxes(columns, 1, 2) @ columns
         normal += 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(5)
         right = columns.swapaxes(1, 2) @ value
@@ -124,15 +137,23 @@ def trail_squares(profile: MeanProfile, weight: float, blur: float) -> Floats:
     return squares / max(float(squares.min()) / max(t.size - PARAMETERS, 1), 1.0)
 
 
-def _step(away: Floats, sigma: Floats, length: Floats) -> Floats:
-    """Step blurred by a Gaussian and by an exponential of a mean length, which is positive outwards."""
+def _step(away: Floats, sigma: Floats, length: Floats) -> tuple[Floats, Floats, Floats]:
+    """Step blurred by a Gaussian and by an exponential of a mean length, and its derivatives by place and by sigma.
+
+    The length is positive outwards. The blurred step s fulfils s + L s' = Phi(x / sigma), and its derivative by sigma
+    is sigma s'', as that of every Gaussian blur.
+    """
     sign = np.where(length < 0.0, -1.0, 1.0)
-    x, size = sign * away, np.maximum(np.abs(length), 1e-6)
-    plain = ndtr(x / sigma)
+    x, size = sign * away, np.abs(length)
+    plain, density = ndtr(x / sigma), np.exp(-0.5 * (x / sigma) ** 2)
+    is_short, size = size < SHORTEST_PX, np.maximum(size, SHORTEST_PX)
     # exp(-x / L + sigma^2 / 2 L^2) Phi(x / sigma - sigma / L), written by the scaled error function without overflow.
     z = (sigma / size - x / sigma) / np.sqrt(2.0)
-    near = 0.5 * np.exp(-0.5 * (x / sigma) ** 2) * erfcx(np.maximum(z, -20.0))
+    near = 0.5 * density * erfcx(np.maximum(z, -20.0))
     far = np.exp(np.minimum(-x / size + 0.5 * (sigma / size) ** 2, 700.0)) * ndtr(-z * np.sqrt(2.0))
-    trailing = np.where(size > 1e-3, np.where(z > -5.0, near, far), 0.0)
+    trailing = np.where(is_short, 0.0, np.where(z > -5.0, near, far))
+    density /= np.sqrt(2.0 * np.pi) * sigma
+    slope = np.where(is_short, density, trailing / size)
+    by_width = np.where(is_short, -x * density / sigma, sigma * (density - slope) / size)
     one_sided = plain - trailing
-    return np.asarray(np.where(sign > 0.0, one_sided, 1.0 - one_sided))
+    return np.where(sign > 0.0, one_sided, 1.0 - one_sided), slope, sign * by_width
