@@ -215,6 +215,36 @@ class BesideEdges:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Roughness:
+    """Roughness of an edge: covariance of its deviations from the mean line.
+
+    Parameters
+    ----------
+    covariance : ndarray of float, shape (n,)
+        Covariance of the normal deviations of two points of the edge, by their distance in whole pixels (pixels
+        squared).
+    is_told : bool
+        Whether the flanks show the roughness significantly; False if they are too short to decide.
+    are_flanks_long : bool
+        Whether the flanks are straight so far down that a longer part of them tells the gap more surely.
+    """
+
+    covariance: Floats
+    is_told: bool = True
+    are_flanks_long: bool = False
+
+    @property
+    def deviation_px(self) -> float:
+        """Standard deviation of the edge about its mean line."""
+        return float(np.sqrt(self.covariance[0]))
+
+    @property
+    def shared_px(self) -> float:
+        """Length of edge (px) that counts as one independent point: the integral of the correlation."""
+        return float((2.0 * self.covariance.sum() - self.covariance[0]) / self.covariance[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CameraModel:
     """Everything that is known about a camera; the default is a camera about which nothing is known.
 
@@ -242,6 +272,8 @@ class CameraModel:
         What the edges show in the frames from which this was learnt (`EdgePoints.unexplained`, `EdgePoints.widened`),
         each with its standard deviation: a frame with others shows something else beside its edges. None if it was not
         learnt from a recording.
+    roughness : Roughness or None
+        Roughness of the specimen's edges, if most frames show it; None if every frame has to tell.
     """
 
     response: ResponseEstimate = field(default_factory=lambda: assumed_response("linear"))
@@ -254,6 +286,7 @@ class CameraModel:
     discrepancy: CameraQuantity = DISCREPANCY
     beside: BesideEdges | None = None
     usual: tuple[tuple[float, float], ...] | None = None
+    roughness: Roughness | None = None
 
 
 ASSUMED_CAMERA = CameraModel()

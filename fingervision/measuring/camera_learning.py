@@ -16,6 +16,7 @@ from fingervision.measuring.scale import Scale
 from fingervision.measuring.temporal_filter import temporal_lag
 from fingervision.vision.defect_pixels import defect_pixels
 from fingervision.vision.flank_profiles import Seen
+from fingervision.vision.gap import specimen_roughness
 from fingervision.vision.grey import to_grey, top_level
 from fingervision.vision.learnt_camera import learnt_camera
 from fingervision.vision.learnt_scene import learnt_beside, less_sure
@@ -99,15 +100,16 @@ def _camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None)
     looks = [(frame, look) for frame in frames if (look := steps_alone(frame, settings)) is not None]
     if not looks:
         return before
-    seen = [each for _, (each, _) in looks]
-    first, polarities = looks[0][0], {is_dark for _, (_, is_dark) in looks}
+    seen = [each for _, (each, _, _) in looks]
+    first, polarities = looks[0][0], {is_dark for _, (_, is_dark, _) in looks}
     are_dark = polarities == {True}
     coding, top = first.coding, max(top_level(to_grey(frame.pixels), settings.bits) for frame, _ in looks)
     if len(looks) < FEWEST:  # too few phases and too much noise for a tone curve
         return replace(before, beside=beside_in(frames, settings))
-    camera = learnt_camera(seen, before, top, coding, are_dark=are_dark)
+    rough = specimen_roughness([(fingers, edges) for _, ((_, edges), _, fingers) in looks], settings.below_tip_px)
+    camera = replace(learnt_camera(seen, before, top, coding, are_dark=are_dark), roughness=rough)
     if coding is not Coding.INTERFRAME:  # such a codec repeats the noise of the picture before
-        lag = temporal_lag([(frame.index, *each) for frame, (each, _) in looks])
+        lag = temporal_lag([(frame.index, *each) for frame, (each, _, _) in looks])
         camera = replace(camera, lag=lag)
     if _has_edge_bias(scale):
         camera = replace(camera, response=before.response, beside=None)

@@ -57,6 +57,8 @@ class CoarseFingers:
         Whether the picture's border cuts off the outer sides of both fingers.
     held_along_px : float or None
         Coordinate along the fingers at which they hold a part; None without a part.
+    are_long : bool
+        Whether the outlines were followed far down, because the edges are rough.
     """
 
     left: CoarseFinger
@@ -66,6 +68,7 @@ class CoarseFingers:
     is_rooted: bool
     are_cut: bool
     held_along_px: float | None = None
+    are_long: bool = False
 
     @property
     def is_joined(self) -> bool:

@@ -1,11 +1,13 @@
 """Step 8, the gap: the distance between the two measuring points, with its uncertainty."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import atan, degrees, hypot, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.camera import Roughness
 from fingervision.domain.frame import Coding
 from fingervision.domain.gap import FingerEdge, GapMeasurement, HeldPart, NoGap
 from fingervision.domain.loops import loop
@@ -33,7 +35,7 @@ from fingervision.vision.residuals import (
     spread,
 )
 from fingervision.vision.rough_corner import with_corner_doubt
-from fingervision.vision.roughness import Roughness, best_linear, roughness, with_roughness
+from fingervision.vision.roughness import best_linear, roughness, with_roughness
 from fingervision.vision.third_tone import THIRD_TONE
 from fingervision.vision.unlike_fingers import NO_CHAINS, Chains, chain_of_one, explains_roughness, polygonal
 
@@ -85,6 +87,7 @@ def measure_gap(
     steepest: float,
     coding: Coding,
     coded_points: float,
+    known: Roughness | None = None,
 ) -> GapMeasurement | NoGap:
     """Measure the gap from the edge points of both fingers.
 
@@ -106,6 +109,8 @@ def measure_gap(
         Coding of the picture.
     coded_points : float
         Number of neighbouring points that share an error of the codec that nothing else states.
+    known : Roughness or None
+        Roughness of the edges, if the recording has told it.
 
     Returns
     -------
@@ -120,7 +125,7 @@ def measure_gap(
     behind = _gripping(fingers, below_tip_px)
     if min(len(p.x) for p in points) < FEWEST_LINES:
         return behind or NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view for a measurement.")
-    shape = _described(points, below_tip_px, max(coded_points, edges.shared_lines))
+    shape = _described(points, below_tip_px, max(coded_points, edges.shared_lines), known)
     points, rough, noise_shared = shape.points, shape.rough, shape.noise_shared
     left, right = shape.ends
     shared = max(shared_points(points, (left, right), coded_points), noise_shared)
@@ -156,6 +161,33 @@ def measure_gap(
     return outcome
 
 
+def specimen_roughness(seen: Sequence[tuple[CoarseFingers, EdgePoints]], below_tip_px: float) -> Roughness | None:
+    """Mean roughness of the edges in several frames; None if most are smooth, or corners look like roughness.
+
+    Parameters
+    ----------
+    seen : sequence of (CoarseFingers, EdgePoints)
+        The fingers, and their sub-pixel outlines, in each frame.
+    below_tip_px : float
+        Distance of the measuring point below the tip.
+    """
+    told = []
+    for fingers, edges in seen:
+        points = outline_points(fingers, edges)
+        left, right = (fit_from_any_radius(p, *first_guess(p, below_tip_px)) for p in points)
+        rough = roughness(points, (left, right))
+        if rough is None or not rough.is_told:
+            continue
+        chains = polygonal(points, below_tip_px, edges.shared_lines)
+        if explains_roughness(chains, points, (left, right), rough.deviation_px):
+            return None
+        told.append((rough.covariance, fingers.are_long))
+    if 2 * len(told) <= len(seen):
+        return None
+    are_long = 2 * sum(is_long for _, is_long in told) > len(told)
+    return Roughness(np.mean([covariance for covariance, _ in told], axis=0), are_flanks_long=are_long)
+
+
 @dataclass(frozen=True, slots=True)
 class _Shapes:
     """Shapes fitted to the outlines of both fingers.
@@ -185,15 +217,17 @@ class _Shapes:
     noise_shared: float
 
 
-def _described(points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, noise_shared: float) -> _Shapes:
+def _described(
+    points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, noise_shared: float, known: Roughness | None
+) -> _Shapes:
     """Fit the shape of each finger's end, and tell rough flanks from corners."""
     guesses = [first_guess(p, below_tip_px) for p in points]
     fits = [fit_from_any_radius(p, *guess) for p, guess in zip(points, guesses, strict=True)]
-    rough = roughness(points, (fits[0], fits[1]))
+    rough = roughness(points, (fits[0], fits[1]), known)
     is_untold = rough is not None and not rough.is_told
     rough = None if is_untold else rough
     chains, are_corners = None, False
-    if rough is not None:
+    if rough is not None and known is None:
         # Corners that are not part of the three-sided shape cause residuals like those of roughness.
         chains = polygonal(points, below_tip_px, noise_shared)
         are_corners = explains_roughness(chains, points, (fits[0], fits[1]), rough.deviation_px)

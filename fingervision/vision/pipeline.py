@@ -122,8 +122,8 @@ def look_closely(
     return _shifted(attempt.outcome, settings.region), attempt.fingers, attempt.edges
 
 
-def steps_alone(frame: Frame, settings: Settings) -> tuple[Seen, bool] | None:
-    """Picture and fitted steps of a frame with a gap, and whether its fingers are darker than the ground.
+def steps_alone(frame: Frame, settings: Settings) -> tuple[Seen, bool, CoarseFingers] | None:
+    """Picture and fitted steps of a frame with a gap, whether its fingers are darker than the ground, and the fingers.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def steps_alone(frame: Frame, settings: Settings) -> tuple[Seen, bool] | None:
     if not isinstance(outcome, GapMeasurement) or fingers is None or edges is None:
         return None
     grey = region_of_interest(blanked(to_grey(frame.pixels), settings.camera.defects), settings.region)
-    return (fingers.orientation.view(grey), edges), outcome.light_gap
+    return (fingers.orientation.view(grey), edges), outcome.light_gap, fingers
 
 
 def steps(frame: Frame, settings: Settings) -> list[tuple[str, Pixels]]:
@@ -246,13 +246,23 @@ def _measured(
     coded: CodedPicture,
     scale: _Scale,
 ) -> _Attempt:
-    """Measure a pair of fingers; if they are rough, measure longer flanks too, and keep the more certain result."""
+    """Measure a pair of fingers; if they are rough, measure longer flanks too, and keep the more certain result.
+
+    Where the recording has told that longer flanks are the more certain ones, they are measured alone.
+    """
     upright = fingers.orientation.view(grey)
     how = (settings, scale, light_gap, coded.with_traces(grey))
+    known, near = settings.camera.roughness, fingers
+    if known is not None and known.are_flanks_long:
+        fingers = with_longer_flanks(near, settings.below_tip_px)
     edges, outcome = _edges_and_gap(upright, fingers, *how)
+    if fingers is not near and not isinstance(outcome, GapMeasurement):
+        fingers = near
+        edges, outcome = _edges_and_gap(upright, fingers, *how)
     if isinstance(outcome, GapMeasurement) and outcome.roughness_px:
-        longer = _edges_and_gap(upright, with_longer_flanks(fingers, settings.below_tip_px), *how)
-        edges, outcome = longer if is_surer(longer[1], outcome) else (edges, outcome)
+        longer = with_longer_flanks(near, settings.below_tip_px)
+        if known is None and is_surer((also := _edges_and_gap(upright, longer, *how))[1], outcome):
+            fingers, (edges, outcome) = longer, also
         if isinstance(outcome, GapMeasurement) and isnan(outcome.roughness_px):
             outcome = replace(outcome, roughness_px=0.0)
         if isinstance(outcome, GapMeasurement) and outcome.u_gap_px > LEAST_SURE_PX * sqrt(coded.shared_points):
@@ -293,6 +303,7 @@ def _edges_and_gap(
         settings.steepest,
         coded.coding,
         coded.shared_points,
+        settings.camera.roughness,
     )
     if isinstance(outcome, GapMeasurement):
         outcome = coded.less_sure(outcome, upright, edges, fingers.orientation, light, top)

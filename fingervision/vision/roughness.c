@@ -122,15 +122,13 @@ LOOP(roughness_errors, "FFFFFf", "") {
     }
 }
 
-/* Cholesky factor for whitening errors whose combinations have at least a given variance. Arguments: covariance (n, n),
-   which is replaced by its Cholesky factor; least variance. Result: whether all combinations have this variance. */
+/* Cholesky factor for whitening errors: covariance (n, n), which is replaced by its Cholesky factor; least variance that the
+   error of a point has if those of the points before it are known. Result: whether all have it. */
 LOOP(roughness_factor, "fd", "b") {
     int64_t n = in[0].shape[0];
-    double *less = floats(n * n);
-    memcpy(less, FLOATS(0), (size_t)(n * n) * sizeof(double));
-    for (int64_t i = 0; i < n; i++) less[i * n + i] -= in[1].d;
-    out[0].i = factor(less, n) && factor(FLOATS(0), n);
-    free(less);
+    int is_sound = factor(FLOATS(0), n);
+    for (int64_t i = 0; i < n && is_sound; i++) is_sound = square(FLOATS(0)[i * n + i]) >= in[1].d;
+    out[0].i = is_sound;
 }
 
 /* Whiten correlated errors in place: Cholesky factor (n, n), columns (n, wide). */

@@ -18,12 +18,13 @@ variances).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isnan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.domain.camera import Roughness
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.loops import loop
 from fingervision.domain.one_thread import one_thread
@@ -52,42 +53,18 @@ SUSPECT, SIGNIFICANT, POSSIBLE = 1.5, 8.0, 2.0
 # Largest distance (pixels) for which the covariance is tabulated.
 FARTHEST_PX = 64
 
-# Number of Gauss-Newton steps from the robust fit to the best linear estimate, and weight that is regarded as zero.
-STEPS, LEAST_WEIGHT = 5, 1e-4
+# Largest number of Gauss-Newton steps from the robust fit to the best linear estimate, squared length of a step (in
+# standard uncertainties) that is the last one, and weight that is regarded as zero.
+STEPS, SETTLED, LEAST_WEIGHT = 5, 1e-4, 1e-4
 
 _likelihood = loop("roughness_likelihood")
 _errors = loop("roughness_errors")
 _factor, _whiten = loop("roughness_factor"), loop("roughness_whiten")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Roughness:
-    """Roughness of an edge: covariance of its deviations from the mean line.
-
-    Parameters
-    ----------
-    covariance : ndarray of float, shape (FARTHEST_PX + 1,)
-        Covariance of the normal deviations of two points of the edge, by their distance in whole pixels (pixels
-        squared).
-    is_told : bool
-        Whether the flanks show the roughness significantly; False if they are too short to decide.
-    """
-
-    covariance: Floats
-    is_told: bool = True
-
-    @property
-    def deviation_px(self) -> float:
-        """Standard deviation of the edge about its mean line."""
-        return float(np.sqrt(self.covariance[0]))
-
-    @property
-    def shared_px(self) -> float:
-        """Length of edge (px) that counts as one independent point: the integral of the correlation."""
-        return float((2.0 * self.covariance.sum() - self.covariance[0]) / self.covariance[0])
-
-
-def roughness(points: Sequence[OutlinePoints], ends: Sequence[FingerEnd]) -> Roughness | None:
+def roughness(
+    points: Sequence[OutlinePoints], ends: Sequence[FingerEnd], known: Roughness | None = None
+) -> Roughness | None:
     """Estimate the roughness from the flanks of the fingers; None if the flanks are smooth.
 
     Parameters
@@ -96,9 +73,13 @@ def roughness(points: Sequence[OutlinePoints], ends: Sequence[FingerEnd]) -> Rou
         Sub-pixel outlines of the fingers.
     ends : sequence of FingerEnd
         Shapes fitted to the outlines.
+    known : Roughness or None
+        What the recording has told, which holds where the flanks are not smooth.
     """
     if max(end.misfit for end in ends) < SUSPECT:
         return None
+    if known is not None:
+        return known
     likelihood, seen = np.zeros((DEVIATIONS_PX.size, LENGTHS_PX.size)), 0
     nothing = 0.0
     for p, end in zip(points, ends, strict=True):
@@ -178,8 +159,11 @@ def best_linear(
         residual, jacobian, _ = compared(parameters, end.origin, x, y, points.u, is_row, is_outer, points.blur)
         white = whitened(np.column_stack([jacobian, residual]))
         covariance = np.asarray(np.linalg.inv(white[:, :-1].T @ white[:, :-1] + prior), dtype=np.float64)
-        parameters = parameters - covariance @ (white[:, :-1].T @ white[:, -1] + prior @ (parameters - start))
+        gradient = white[:, :-1].T @ white[:, -1] + prior @ (parameters - start)
+        parameters = parameters - covariance @ gradient
         parameters[[INNER_R, OUTER_R]] = np.maximum(parameters[[INNER_R, OUTER_R]], 0.0)
+        if gradient @ covariance @ gradient < SETTLED:
+            break
     residual, _, _ = compared(parameters, end.origin, x, y, points.u, is_row, is_outer, points.blur)
     return FingerEnd(parameters, covariance, end.origin, 1.0, residual, end.robust)
 
@@ -187,9 +171,10 @@ def best_linear(
 def _whitening(errors: Floats, least_variance: float) -> Callable[[Floats], Floats]:
     """Transformation to white errors of unit variance, from the errors' covariance in units of the points' variances.
 
-    No combination of points can have a smaller variance than the points' noise (`least_variance`), but rounding errors
-    of the tabulated covariance may cause smaller values. Cholesky's decomposition takes a tenth of the time of
-    eigenvalues, and is used if all variances are larger.
+    The error of no point, and of no combination of them, can have a smaller variance than the points' noise
+    (`least_variance`), but rounding errors of the tabulated covariance may cause smaller values. Cholesky's
+    decomposition takes a tenth of the time of eigenvalues, and is used if the variance of every point given those
+    before it is larger.
     """
     factor = errors.copy()
     if _factor(factor, least_variance):
@@ -223,7 +208,7 @@ def with_longer_flanks(fingers: CoarseFingers, below_tip_px: float) -> CoarseFin
         finger if finger.hidden.size else _longer(finger, below_tip_px + LONG_PX)
         for finger in (fingers.left, fingers.right)
     )
-    return replace(fingers, left=left, right=right)
+    return replace(fingers, left=left, right=right, are_long=True)
 
 
 def is_surer(longer: GapMeasurement | NoGap, near: GapMeasurement) -> bool:

@@ -35,9 +35,9 @@ def beside_in(frames: Sequence[Frame], settings: Settings) -> BesideEdges | None
     """
     with one_thread():
         looks = [(frame, look) for frame in frames if (look := steps_alone(frame, settings)) is not None]
-        are_dark = {is_dark for _, (_, is_dark) in looks}
+        are_dark = {is_dark for _, (_, is_dark, _) in looks}
         if len(are_dark) != 1 or (looks[0][0].coding is Coding.INTERFRAME and len(looks) < FEWEST_PREDICTED):
             return None
         top = max(top_level(to_grey(frame.pixels), settings.bits) for frame, _ in looks)
-        seen, coding = [seen for _, (seen, _) in looks], looks[0][0].coding
+        seen, coding = [seen for _, (seen, _, _) in looks], looks[0][0].coding
         return learnt_beside(seen, settings.camera.response, top, coding, are_dark=are_dark.pop())

@@ -8,16 +8,17 @@ from functools import partial
 import numpy as np
 import pytest
 
+from fingervision.domain.camera import Roughness
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.vision.finger_end import FingerEnd, fit_finger_end
 from fingervision.vision.first_guess import first_guess
-from fingervision.vision.gap import TOO_ROUGH
+from fingervision.vision.gap import TOO_ROUGH, specimen_roughness
 from fingervision.vision.measuring_point import measuring_point, squared
 from fingervision.vision.outline_points import OutlinePoints
-from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame
-from fingervision.vision.roughness import Roughness, best_linear, is_surer, roughness, with_roughness
+from fingervision.vision.pipeline import LINEAR_CAMERA, Settings, measure_frame, steps_alone
+from fingervision.vision.roughness import best_linear, is_surer, roughness, with_roughness
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX, plain, texture
 from tests.benchmarks.camera_artefacts.optics import Surface
 
@@ -117,6 +118,26 @@ def test_a_row_sees_more_of_roughness_on_a_slant() -> None:
 def test_noise_alone_is_not_rough() -> None:
     rng = np.random.default_rng(3)
     assert all(found(rng, 0.0, 1.0) is None for _ in range(20))
+
+
+def test_a_recording_tells_the_roughness_of_its_edges() -> None:
+    """Frames with waves of 0.3 px tell it together; from smooth ones nothing is learnt."""
+    settings, rng = Settings(BELOW_PX, Direction.UP, camera=LINEAR_CAMERA), np.random.default_rng(41)
+    learnt = []
+    for rough_px in (0.3, 0.0):
+        frames = [Frame(plain(rng, Surface(rough_px=rough_px)).picture, k) for k in range(4)]
+        looks = [look for frame in frames if (look := steps_alone(frame, settings)) is not None]
+        learnt.append(specimen_roughness([(fingers, edges) for (_, edges), _, fingers in looks], BELOW_PX))
+    rough, smooth = learnt
+    assert smooth is None
+    assert rough is not None
+    assert 0.2 < rough.deviation_px < 0.45
+    shot = plain(rng, Surface(rough_px=0.3))
+    known = replace(settings, camera=replace(settings.camera, roughness=rough))
+    found = measure_frame(Frame(shot.picture, 0), known)
+    assert isinstance(found, GapMeasurement)
+    assert found.roughness_px == pytest.approx(rough.deviation_px)
+    assert abs(found.gap_px - shot.gap_px) < 3.0 * np.hypot(found.u_gap_px, found.u_picture_px)
 
 
 def test_longer_flanks_count_where_they_agree() -> None:
