@@ -209,6 +209,7 @@ def command(
     response.png. For a mechanism.toml, the results over the input are in mechanism.csv.
 
     From the outline of a DXF or SVG file, the command begins a mechanism.toml, with the lines that are to be completed.
+    Its thin strips and notches are flexures.
     """
     import json
 

@@ -52,11 +52,8 @@ class Frame:
 
 def pieces_of(plate: PlaneStressPlate) -> Indices:
     """Number the connected parts of a mesh; return the part's number for every node, in the order of `nodes_mm`."""
-    dofs = plate.unknowns_of_triangles[:, :6]
-    place_of = np.empty(plate.unknowns, dtype=np.int64)
-    place_of[plate.x_dofs] = np.arange(plate.x_dofs.size)
-    nodes = place_of[dofs]
-    rows, columns = np.repeat(nodes[:, 0], 6), nodes.ravel()
+    nodes = plate.nodes_of_triangles
+    rows, columns = np.repeat(nodes[0], 6), nodes.T.ravel()
     count = plate.x_dofs.size
     graph = coo_matrix((np.ones(rows.size), (rows, columns)), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

@@ -33,6 +33,7 @@ _NARROW = 0.1
 """Ratio of width to length below which the share is proportional to the width, because the bodies restrain a length
 equal to the width."""
 _DIGITS = 3
+_GAUSS = legendre.leggauss(24)
 
 
 def strip_share(width_over_length: float, poisson: float) -> tuple[float, float]:
@@ -73,8 +74,7 @@ def stretched_share(width_over_length: float, poisson: float) -> float:
 @lru_cache(maxsize=512)
 def _stretched(log_width: float, poisson: float) -> float:
     width = float(np.exp(log_width))
-    x, x_weights = (0.5 * (part + 1.0) if i == 0 else 0.5 * part for i, part in enumerate(legendre.leggauss(24)))
-    y, y_weights = legendre.leggauss(24)
+    (y, y_weights), (x, x_weights) = _GAUSS, (0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1])
     along = [poly.polymul([0.0, 1.0, -1.0], _shifted(m)) for m in range(_ALONG)]
     f, fx = (np.array([poly.polyval(x, poly.polyder(p, k)) for p in along]) for k in range(2))
 
@@ -106,8 +106,7 @@ def _stretched(log_width: float, poisson: float) -> float:
 def _shares(log_width: float, poisson: float) -> tuple[float, float]:
     """Compute the two weights of `strip_share` for a strip of unit length that is not narrow."""
     width = float(np.exp(log_width))
-    x, x_weights = (0.5 * (part + 1.0) if i == 0 else 0.5 * part for i, part in enumerate(legendre.leggauss(24)))
-    y, y_weights = legendre.leggauss(24)
+    (y, y_weights), (x, x_weights) = _GAUSS, (0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1])
     # Along the strip, the functions have no displacement and no slope at the ends; across it, they are even
     # polynomials.
     clamped = poly.polymul([0.0, 0.0, 1.0], poly.polypow([1.0, -1.0], 2))

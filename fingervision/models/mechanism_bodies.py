@@ -178,9 +178,7 @@ def body_weights(plate: PlaneStressPlate, bodies: Sequence[LinkBody]) -> Mapping
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     third = np.abs(one[0] * two[1] - one[1] * two[0]) / 6.0
     middles = corners.mean(axis=1)
-    place_of = np.empty(plate.unknowns, dtype=np.int64)
-    place_of[plate.x_dofs] = np.arange(plate.x_dofs.size)
-    edges = place_of[plate.unknowns_of_triangles[:, 3:6]]
+    edges = plate.nodes_of_triangles[3:].T
     found: dict[str, tuple[Array, Array]] = {}
     for number, body in enumerate(bodies):
         if not body.is_fixed:

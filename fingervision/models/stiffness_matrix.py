@@ -30,7 +30,7 @@ from scipy.sparse import csr_matrix, diags, identity
 from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper, PointMm
 from fingervision.models.answer_figures import LINEAR, Physics
-from fingervision.models.corotational_frame import CorotationalFrame
+from fingervision.models.corotational_frame import CorotationalFrame, turned_axes
 from fingervision.models.elastic_mechanism import ElasticMechanism, LargestStress
 from fingervision.models.flexure_span import FlexureSpan
 from fingervision.models.flexure_stress import nominal_stress
@@ -220,8 +220,7 @@ def _turned(arm: Array, angle: float, *, large: bool) -> Array:
     """Displacement of the far end of an arm that rotates about its other end."""
     if not large:
         return angle * np.array([-arm[1], arm[0]])
-    c, s = np.cos(angle) - 1.0, np.sin(angle)
-    return np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+    return np.asarray((turned_axes(angle) - np.eye(2)) @ arm)
 
 
 KIND = "stiffness_matrix"
