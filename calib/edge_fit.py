@@ -408,6 +408,28 @@ def fitted(
     )
 
 
+def with_placed_edges(
+    family: Family, data: EdgeData, start: Floats, scene: Scene, begin: tuple[Floats, Floats]
+) -> Floats:
+    """The unknowns with every edge where its own profile fits best: each step of a scene may be the one that was found.
+
+    Parameters
+    ----------
+    family, data, start, scene, begin : Family, EdgeData, ndarray of float, Scene, (ndarray of float, ndarray of float)
+        See `fitted`.
+    """
+    distances, weights = (each[0] for each in scene.steps(begin[1][None], data.side, data.is_outer))
+    mean = np.einsum("en,en->e", distances, weights)
+    tried = -np.stack([mean, distances.min(axis=-1), distances.max(axis=-1), np.zeros(mean.size)])
+    squares, placed, at = [], start.copy(), data.own_places()[:, 0]
+    for positions in tried:
+        placed[at] = positions
+        residual = _Seen.of(family, scene, data, np.concatenate([*begin, placed])).residual(data)
+        squares.append(np.sum(residual.reshape(mean.size, -1) ** 2, axis=1))
+    placed[at] = tried[np.argmin(squares, axis=0), np.arange(mean.size)]
+    return placed
+
+
 def with_smoothing(data: EdgeData, families: Sequence[Family]) -> EdgeData:
     """The same bins, and whether pixels were smoothed, which sharp edges tell.
 

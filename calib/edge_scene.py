@@ -40,8 +40,8 @@ class Scene:
         See `Steps`.
     mean, u : tuple of float
         Prior means and standard deviations of the parameters.
-    starts : tuple of (tuple of float, float, float)
-        Parameters from which a fit begins, and the positions of inner and of outer edges that go with them (pixels).
+    starts : tuple of tuple of float
+        Parameters from which a fit begins.
     probability : float
         Prior probability.
     u_form : float
@@ -55,10 +55,15 @@ class Scene:
     steps: Steps
     mean: tuple[float, ...]
     u: tuple[float, ...]
-    starts: tuple[tuple[tuple[float, ...], float, float], ...]
+    starts: tuple[tuple[float, ...], ...]
     probability: float
     u_form: float = 0.0
     is_on_tip: bool = False
+
+    @property
+    def is_all_round(self) -> bool:
+        """Whether it adds the same light along the whole outline; a side wall or a hard shadow lies on some flanks."""
+        return not self.has_wall and (self.is_on_tip or not self.name)
 
     @property
     def has_wall(self) -> bool:
@@ -99,6 +104,17 @@ def _band(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
     breadth = np.broadcast_to(np.exp(p[:, :1]), (len(p), side.size))
     light = _logistic(p[:, 1:2] + p[:, 2:3] * is_outer)
     return np.stack([-breadth, np.zeros_like(breadth)], -1), np.stack([light, 1.0 - light], -1)
+
+
+def _hard_shadow(faces: Callable[[Floats, Bools], Floats]) -> Steps:
+    """Shadow with a hard edge beside the flanks for which `faces` is not zero: its breadth, its depth as a logit."""
+
+    def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+        breadth = np.broadcast_to(np.exp(p[:, :1]), (len(p), side.size))
+        depth = _logistic(p[:, 1:2]) * faces(side, is_outer)
+        return np.stack([np.zeros_like(breadth), breadth], -1), np.stack([1.0 - depth, depth], -1)
+
+    return steps
 
 
 def _mark(faces: Callable[[Floats, Bools], Floats]) -> Steps:
@@ -165,33 +181,30 @@ def _log(*widths: float) -> tuple[float, ...]:
 # Prior means and standard deviations, and starts of the fits. Widths are those of parts of 0.1 to 2 mm at 10 to
 # 60 px/mm.
 _WALL = ((*_log(3.0, 3.0), 0.0), (0.8, 0.8, 0.9))
-_INNER_WALL = (*_WALL, tuple(((*_log(width, width), 0.0), -0.5 * width, 0.0) for width in (1.2, 3.0, 7.0)))
-_SIDE_WALL = (*_WALL, tuple(((*_log(width, width), 0.0), -0.25 * width, -0.25 * width) for width in (1.5, 4.0, 8.0)))
+_INNER_WALL = (*_WALL, tuple((*_log(width, width), 0.0) for width in (1.2, 3.0, 7.0)))
+_SIDE_WALL = (*_WALL, tuple((*_log(width, width), 0.0) for width in (1.5, 4.0, 8.0)))
 _LINE = (
     (*_log(2.0, 2.0, 0.5), 0.0),
     (0.7, 0.7, 0.8, 0.5),
-    tuple(((*_log(near, 1.5, 0.6), 0.0), at, at) for near, at in ((0.7, 1.0), (0.7, 0.3), (3.0, 0.3))),
+    tuple((*_log(near, 1.5, 0.6), 0.0) for near in (0.7, 3.0)),
 )
-_BAND = (
-    (*_log(3.0), 0.0, 0.0),
-    (0.7, 1.2, 0.3),
-    tuple(((*_log(width), 0.0, 0.0), 0.5 * width, 0.5 * width) for width in (1.5, 4.0)),
-)
+_BAND = ((*_log(3.0), 0.0, 0.0), (0.7, 1.2, 0.3), tuple((*_log(width), 0.0, 0.0) for width in (1.5, 4.0)))
 _DEPTH_LENGTH_SIDE = (-1.0, *_log(6.0), 0.0), (1.0, 0.7, 3.0)
 _SHADOW_STARTS = tuple((-1.5, *_log(length), side) for side in (0.0, 5.0, -5.0) for length in (4.0, 10.0))
-_SHADOW = (*_DEPTH_LENGTH_SIDE, tuple((start, -0.3, -0.3) for start in _SHADOW_STARTS))
+_SHADOW = (*_DEPTH_LENGTH_SIDE, _SHADOW_STARTS)
 _SHADOW_APART = (
     (*_DEPTH_LENGTH_SIDE[0], *_log(2.0)),
     (*_DEPTH_LENGTH_SIDE[1], 0.7),
-    tuple(((*start, *_log(2.0)), -0.3, -0.3) for start in _SHADOW_STARTS[::2]),
+    tuple((*start, *_log(2.0)) for start in _SHADOW_STARTS[::2]),
 )
 
-_MARK = ((*_log(5.0), 0.0), (0.7, 0.06), tuple(((*_log(width), 0.05), 0.0, 0.0) for width in (3.0, 8.0)))
-_SPREAD = (_log(2.0), (0.7,), ((_log(2.0), 0.0, 0.0), (_log(5.0), 0.0, 0.0)))
-_TRAIL = ((0.0, 0.0), (2.0, 2.0), tuple(((x, y), 0.0, 0.0) for x in (-1.5, 1.5) for y in (-1.5, 1.5)))
-_MOTION = (_log(4.0, 4.0), (1.0, 1.0), tuple((_log(way, way), 0.0, 0.0) for way in (3.0, 8.0)))
+_HARD_SHADOW = ((*_log(6.0), 0.0), (0.7, 1.2), tuple((*_log(width), 0.0) for width in (3.0, 8.0)))
+_MARK = ((*_log(5.0), 0.0), (0.7, 0.06), tuple((*_log(width), 0.05) for width in (3.0, 8.0)))
+_SPREAD = (_log(2.0), (0.7,), (_log(2.0), _log(5.0)))
+_TRAIL = ((0.0, 0.0), (2.0, 2.0), tuple((x, y) for x in (-1.5, 1.5) for y in (-1.5, 1.5)))
+_MOTION = (_log(4.0, 4.0), (1.0, 1.0), tuple(_log(way, way) for way in (3.0, 8.0)))
 
-NOTHING = Scene("", _nothing, (), (), (((), 0.0, 0.0),), 0.48)
+NOTHING = Scene("", _nothing, (), (), ((),), 0.48)
 # Prior probabilities: one recording in ten shows a wall (thick parts), a shadow, or a bright line (edges that are
 # chamfered or polished); a chamfer that is evenly bright up to the edge on all sides is rare.
 SCENES = (
@@ -203,6 +216,8 @@ SCENES = (
     Scene("shadow", _shadow(EVEN), *_SHADOW, 0.045, 0.1, True),
     Scene("shadow", _shadow(EXPONENTIAL, np.asarray(np.exp(-EXPONENTIAL))), *_SHADOW, 0.045, 0.1, True),
     Scene("shadow", _shadow(EVEN, is_apart=True), *_SHADOW_APART, 0.01, 0.1, True),
+    Scene("shadow", _hard_shadow(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_HARD_SHADOW, 0.01, 0.1),
+    Scene("shadow", _hard_shadow(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_HARD_SHADOW, 0.01, 0.1),
     Scene("", _mark(lambda side, is_outer: np.where(is_outer, 0.0, 1.0)), *_MARK, 0.03),
     Scene("", _mark(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_MARK, 0.02),
     Scene("", _mark(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_MARK, 0.02),
@@ -227,11 +242,7 @@ def pair(first: Scene, second: Scene) -> Scene:
     name = " and ".join(sorted((first.name, second.name)))
     chance = first.probability * second.probability / NOTHING.probability
     u_form = float(np.hypot(first.u_form, second.u_form))
-    starts = tuple(
-        (own + other, inner + other_inner, outer + other_outer)
-        for own, inner, outer in first.starts
-        for other, other_inner, other_outer in second.starts
-    )
+    starts = tuple(own + other for own in first.starts for other in second.starts)
     is_on_tip = first.is_on_tip or second.is_on_tip
     return Scene(name, steps, first.mean + second.mean, first.u + second.u, starts, chance, u_form, is_on_tip)
 

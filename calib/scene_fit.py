@@ -16,6 +16,7 @@ from calib.edge_fit import (
     edge_width,
     fitted,
     priors,
+    with_placed_edges,
     with_smoothing,
 )
 from calib.edge_profile import EdgeProfile
@@ -139,12 +140,12 @@ def _fits(
 ) -> list[EdgeFit]:
     """Fits of one scene with each family, from the best of its starts."""
     begun = []
-    for own, inner_px, outer_px in scene.starts:
+    for own in scene.starts:
         start = data.start()
         start[0] = np.log(narrowest_px / START_WIDENED)
-        start[data.own_places()[:, 0]] = np.where(data.is_outer, outer_px, inner_px)
         begin = np.array(families[0].mean), np.array(own)
-        begun.append(fitted(families[0], coarse, start, scene, begin, FIRST_STEPS))
+        placed = with_placed_edges(families[0], coarse, start, scene, begin)
+        begun.append(fitted(families[0], coarse, placed, scene, begin, FIRST_STEPS))
     best = max(begun, key=lambda fit: fit.log_evidence)
     found = []
     for family in families:

@@ -7,6 +7,7 @@ it, however much of it was in the line's window.
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,27 @@ def moved_by_recording(
     name = beside.name if beside.probability > 0.5 else edges.beside
     moved = replace(edges, position=position, marks=stated_marks(edges, u_px), beside=name)
     return moved if beside.added is None else _without_added(upright, moved, light, beside.added)
+
+
+def u_aslant_px(beside: BesideEdges, slopes: tuple[float, float]) -> float:
+    """Standard uncertainty of the gap (px), because a shadow or an obliquely seen wall may also lie along the fingers.
+
+    Both are a copy of the outline displaced in one direction, which is the same at both fingers. The straight flanks
+    show how far it lies across the fingers; along them it is taken to be as far. Where the measured edge is slanted,
+    the copy's distance from it differs by the slope times this.
+
+    Parameters
+    ----------
+    beside : BesideEdges
+        What the recording shows beside the edges.
+    slopes : (float, float)
+        Slope of both edges at the measuring height.
+    """
+    left, right = beside.inner_px
+    if beside.added is not None or not (left or right):
+        return 0.0
+    one_way = abs(left - right) / (abs(left) + abs(right))
+    return one_way * hypot(left * slopes[0], right * slopes[1])
 
 
 # Largest number of rounds in which edge and disturbance are fitted alternately.

@@ -267,7 +267,7 @@ def beside_edges(fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile]) -> Be
         mean(common, False),
         u_sum(at),
         u_sum(far),
-        None if best.scene.has_wall else _added(fits, weight, side, is_outer, place),
+        _added(fits, weight, side, is_outer, place) if best.scene.is_all_round else None,
     )
 
 
@@ -278,11 +278,11 @@ def _added(
     is_outer: NDArray[np.bool_],
     place: dict[tuple[int, bool], int],
 ) -> AddedLight:
-    """Mean light that the fits without a wall add to a finger's own step."""
+    """Mean light that those fits add to a finger's own step which add it all round."""
     away = np.arange(-ADDED_PX, ADDED_PX, ADDED_EVERY_PX)
     total, width, seen = np.zeros((side.size, away.size)), 0.0, 0.0
     for fit, own in zip(fits, weight, strict=True):
-        if fit.scene.has_wall or own < LEAST_WEIGHT:
+        if not fit.scene.is_all_round or own < LEAST_WEIGHT:
             continue
         at, share = (each[0] for each in fit.scene.steps(fit.beside[None], side, is_outer))
         step = BlurredStep.of(fit.shared, fit.by_pixels)

@@ -5,7 +5,7 @@ Only the module `pipeline` determines the order of the steps.
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import isnan, sqrt
+from math import hypot, isnan, sqrt
 from typing import Any
 
 import cv2
@@ -22,7 +22,7 @@ from fingervision.vision.binarise import Binary, binarise, split_at
 from fingervision.vision.candidates import candidates, found, has_edges, local_change
 from fingervision.vision.coded_picture import CodedPicture, coded_picture
 from fingervision.vision.defect_pixels import blanked, repaired
-from fingervision.vision.edge_moves import STEPS_ALONE, moved_by_recording
+from fingervision.vision.edge_moves import STEPS_ALONE, moved_by_recording, u_aslant_px
 from fingervision.vision.edges import EdgePoints, fit_edges
 from fingervision.vision.fingers import CoarseFingers
 from fingervision.vision.flank_profiles import Seen
@@ -61,6 +61,9 @@ FINAL = (Status.SATURATED, Status.BLURRED, Status.GRIPPING)
 # Largest standard uncertainty (pixels) of a gap that is measured beside a shadow or pad with another threshold; a
 # larger uncertainty suggests that other edges were measured.
 LEAST_SURE_AGAIN_PX = 0.3
+# Distance (pixels) beyond a window of the end of a strip that does not act on it: two standard deviations of a usual
+# blur, and the error to which the breadth is known.
+ALONE_PX = 3.0
 # Standard deviations by which what a frame's edges show differs from the usual if something else stands beside them,
 # and least relative differences of the squared residuals and of the flanks' squared blur.
 UNLIKE_SIGMAS, LEAST_UNLIKE = 5.0, (0.3, 0.06)
@@ -307,6 +310,9 @@ def _edges_and_gap(
     )
     if isinstance(outcome, GapMeasurement):
         outcome = coded.less_sure(outcome, upright, edges, fingers.orientation, light, top)
+    if isinstance(outcome, GapMeasurement) and beside is not None:
+        u_px = u_aslant_px(beside, (outcome.left.slope, outcome.right.slope))
+        outcome = replace(outcome, u_shift_px=hypot(outcome.u_shift_px, u_px))
     if (apart_px or edges.beside or is_unlike) and isinstance(outcome, GapMeasurement):
         outcome = replace(outcome, fields_apart_px=apart_px, beside=edges.beside, is_unlike=is_unlike)
     return edges, outcome
@@ -347,15 +353,18 @@ def _with_two_tones(
     if not isinstance(attempt.outcome, GapMeasurement) or attempt.fingers is None or attempt.edges is None:
         return attempt
     upright = attempt.fingers.orientation.view(grey)
-    threshold = other_threshold(upright, attempt.edges)
-    if threshold is None or attempt.binary is None:
+    strip = other_threshold(upright, attempt.edges)
+    if strip is None or attempt.binary is None:
         return attempt
+    threshold, breadth_px = strip
     split = split_at(denoised, attempt.binary, round(threshold))
     fingers = found(split, light_gap, (attempt.fingers.orientation.direction,), settings)
     if isinstance(fingers, CoarseFingers):
         again = _measured(grey, split, fingers, light_gap, settings, coded, scale)
         if isinstance(again.outcome, GapMeasurement) and again.edges is not None:
             is_sure = again.outcome.u_gap_px < LEAST_SURE_AGAIN_PX
+            # Where a window holds both ends of the strip, a single step may be fitted to either.
+            is_sure = is_sure and again.edges.reach_px < breadth_px - ALONE_PX
             if is_sure and other_threshold(upright, again.edges) is None:
                 return again
         elif again.outcome.status in FINAL:

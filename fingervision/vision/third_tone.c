@@ -43,18 +43,20 @@ static int level_at(const Arg *upright, const Side *side, int64_t d, double *lev
     return 1;
 }
 
-/* Mean level of the step at which a strip outside (sense 1) or inside (sense -1) a side ends; 0 if there is no strip. A
-   strip between finger and background ends with a step of the same sign as the edge. */
+/* Mean level of the step at which a strip outside (sense 1) or inside (sense -1) a side ends, and its distance from the
+   edge; 0 if there is no strip. A strip between finger and background ends with a step of the same sign as the edge. */
 static double strip_end(const Arg *upright, const Side *side, int64_t near, int64_t room_px, int64_t sense, double contrast,
-                        double least) {
+                        double least, double *breadth) {
     double profile[REACH_PX + 1], most = least * fabs(contrast), found = 0.0;
     double way = contrast > 0.0 ? 1.0 : contrast < 0.0 ? -1.0 : 0.0;
+    *breadth = 0.0;
     int64_t last = near - 1, end = sense > 0 ? smaller_int(REACH_PX, room_px) : REACH_PX;
     while (last < end && level_at(upright, side, sense * (last + 1), &profile[last + 1])) last++;
     for (int64_t d = near; d + STEP_PX <= last; d++) {
         double step = (double)sense * (profile[d + STEP_PX] - profile[d]) * way;
         if (step > most) {
             most = step;
+            *breadth = d + 0.5 * STEP_PX;
             found = 0.5 * (profile[d] + profile[d + STEP_PX]);
         }
     }
@@ -63,14 +65,14 @@ static double strip_end(const Arg *upright, const Side *side, int64_t near, int6
 
 /* Inner and outer strip along a finger's side. Arguments: picture, fixed, position, weight and outward sign (2, PLACES),
    which finger, first and last entry of the side, least and largest distance from the edge, least step inside (share of
-   the contrast); results, levels at the ends of the inner and of the outer strip. */
-LOOP(third_tone_strips, "pIFFIiiiiid", "dd") {
+   the contrast); results, level at the end of the inner strip, its breadth, and the same of the outer strip. */
+LOOP(third_tone_strips, "pIFFIiiiiid", "dddd") {
     int64_t first = in[5].i * in[1].shape[1] + in[6].i, near = in[8].i;
     double inside, outside;
-    out[0].d = out[1].d = 0.0;
+    out[0].d = out[1].d = out[2].d = out[3].d = 0.0;
     if (near + STEP_PX > REACH_PX || near > in[9].i) return;
     Side side = side_of(INTS(1) + first, FLOATS(2) + first, FLOATS(3) + first, INTS(4)[first], in[7].i - in[6].i);
     if (!level_at(&in[0], &side, -near, &inside) || !level_at(&in[0], &side, near, &outside)) return;
-    out[0].d = strip_end(&in[0], &side, near, in[9].i, -1, outside - inside, in[10].d);
-    out[1].d = strip_end(&in[0], &side, near, in[9].i, 1, outside - inside, LEAST_STEP);
+    out[0].d = strip_end(&in[0], &side, near, in[9].i, -1, outside - inside, in[10].d, &out[1].d);
+    out[2].d = strip_end(&in[0], &side, near, in[9].i, 1, outside - inside, LEAST_STEP, &out[3].d);
 }

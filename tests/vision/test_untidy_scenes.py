@@ -189,7 +189,7 @@ def test_the_spaces_of_a_letter_are_no_fingers() -> None:
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5])
-@pytest.mark.parametrize("width_px", [16.0, 25.0])
+@pytest.mark.parametrize("width_px", [3.0, 8.0, 16.0, 25.0])
 def test_a_hard_shadow_to_one_side_of_both_fingers_is_no_finger(width_px: float, share: float) -> None:
     for number in (1, 7, 13):
         scene = Scene(np.random.default_rng([number, 96]))
@@ -200,4 +200,6 @@ def test_a_hard_shadow_to_one_side_of_both_fingers_is_no_finger(width_px: float,
         shot = scene.done()
         found = measure_picture(Frame(shot.picture, 0), SETTINGS)
         assert shot.gap_px is not None
-        assert isinstance(found, NoGap) or abs(found.gap_px - shot.gap_px) < 1.0  # not by the shadow's width
+        if isinstance(found, GapMeasurement):
+            known_px = SIGMAS * float(np.hypot(found.u_gap_px, found.u_picture_px))
+            assert abs(found.gap_px - shot.gap_px) < max(known_px, 0.25)
