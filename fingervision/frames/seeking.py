@@ -63,12 +63,10 @@ class VideoSeeking:
     ----------
     name : str
         Path of the file.
-    grows : bool
-        Whether the file is still written: then each picture is decoded from its own packet, which may be the last.
     """
 
-    def __init__(self, name: str, *, grows: bool = False) -> None:
-        self._name, self._grows = name, grows
+    def __init__(self, name: str) -> None:
+        self._name = name
         self._coding = video_file.VideoFile(name).description.coding
         self._container: av.container.InputContainer | None = None
         self._pictures: Iterator[tuple[av.VideoFrame, Quantiser | None]] | None = None
@@ -88,8 +86,8 @@ class VideoSeeking:
         if self._container is None:
             self._container, self._pictures = open_container(self._name), None
             codec = self._container.streams.video[0].codec_context
-            # Threads decode a group of pictures sooner, but hold each picture back for later packets.
-            codec.options, codec.thread_type, codec.thread_count = EXPORTED, "AUTO", int(self._grows)
+            # Without threads a picture is decoded from its own packet, which may be the last in a file that is written.
+            codec.options, codec.thread_count = EXPORTED, 1
         stream = self._container.streams.video[0]
         if stream.time_base is None:
             return None

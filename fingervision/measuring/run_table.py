@@ -158,7 +158,7 @@ class RunTable:
         """Read a frame from the video, where it is complete once another follows."""
         with self._room:
             self._room.wait_for(lambda: self._newest > item.index or self._is_complete)
-        self._video = self._video or VideoSeeking(str(self._description.files[0]), grows=True)
+        self._video = self._video or VideoSeeking(str(self._description.files[0]))
         # At the end of a file that is still written, a reader stops; another one goes on.
         found = self._video.frame(item.index, item.time_s) or self._video.frame(item.index, item.time_s)
         return found or LostFrame(item.index, item.time_s, Status.DAMAGED, UNREADABLE)
