@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 LENGTHS_PX = np.array([0.2, 0.4, 0.6, 0.85, 1.2, 1.7, 2.4, 3.4, 4.8])
 TRIED_PX = np.concatenate((-LENGTHS_PX[::-1], (0.0,), LENGTHS_PX))
 SPACING_PX = np.gradient(TRIED_PX)
-# Lengths of which one shows at least a quarter of the gain of any other one: the effect grows with the length's cube.
-FIRST_PX, FIRST_SHARE = np.array([-2.4, -0.85, 0.0, 0.85, 2.4]), 0.25
+# Lengths of which one shows a quarter of the gain of any other one: the effect grows with the length's cube.
+FIRST_PX, FIRST_SHARE = np.array([-2.4, -1.2, -0.6, 0.0, 0.6, 1.2, 2.4]), 0.25
 # Sharpening and the tails of real optics: a step with this multiple of the blur minus the step itself, as in the other
 # models of a profile.
 TAIL_BLURS = 2.2
