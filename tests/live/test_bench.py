@@ -1,6 +1,7 @@
 """Control of the test bed from the page: limits as in the command, stop by any user, motion only with permission."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -242,6 +243,8 @@ def test_a_prediction_follows_the_inputs_path_where_the_model_has_a_memory(tmp_p
     prediction = Prediction(read_model(tmp_path / "model.toml"))
     way = [*np.linspace(0.0, 1.0, 41), *np.linspace(1.0, 0.0, 41)]
     rows = [GapRow(i, i / 25, Status.OK, gap_mm=4.0, input_mm=float(at)) for i, at in enumerate(way)]
+    # Rows of a recording come once before their inputs are known.
+    assert set(prediction.predicted_mm([replace(row, input_mm=None) for row in rows])) == {None}
     found = [prediction.predicted_mm([row])[0] for row in rows]
     # Up and down, the same input differs by the play times the slope of 3.
     assert found[20] is not None

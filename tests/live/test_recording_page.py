@@ -200,6 +200,22 @@ def modelled(frames: Path, tmp_path: Path) -> Iterator[str]:
         view.stop()
 
 
+def test_a_change_is_as_unsure_as_what_grows_with_the_gap(served: str, opened: Callable[..., Any]) -> None:
+    page = opened(served)
+    gap_mm = np.linspace(4.0, 16.0, 101)
+    random_mm, fixed_mm, relative = 0.001, 0.01, 0.003
+    u_mm = np.sqrt(random_mm**2 + fixed_mm**2 + (relative * gap_mm) ** 2)
+    nothing = [None] * gap_mm.size
+    columns = {
+        "time": (gap_mm / 3.0).tolist(), "gap": gap_mm.tolist(), "low": (gap_mm - 2 * u_mm).tolist(),
+        "high": (gap_mm + 2 * u_mm).tolist(), "model": nothing, "frame": list(range(gap_mm.size)),
+        "status": nothing, "random": [random_mm] * gap_mm.size, "u_difference": nothing,
+    }  # fmt: skip
+    said = page.evaluate("async given => (await import('/page/range_statistics.js')).statistics(given, 0, 9)", columns)
+    assert said["U_change"] == pytest.approx(2.0 * np.hypot(np.sqrt(2.0) * random_mm, relative * 12.0), rel=1e-3)
+    assert said["U_slope"] == pytest.approx(2.0 * relative * 3.0, rel=1e-2)
+
+
 def dragged(page: Any, chart: str, shares: tuple[float, float], *, shift: bool = False) -> None:
     """Drag over a part of a chart."""
     box = page.locator(f"{chart} .u-over").bounding_box()

@@ -232,10 +232,11 @@ class Prediction:
         Parameters
         ----------
         rows : sequence of GapRow
-            Rows in order; gaps that were predicted before are not computed again.
+            Rows in order; gaps that were predicted before are not computed again. A row may come again once its input
+            is known.
         """
         with self._lock:
-            fresh = [row for row in rows if row.frame not in self._known]
+            fresh = [row for row in rows if row.input_mm is not None and row.frame not in self._known]
             for run_rows in _by_run(fresh):
                 self._add(run_rows)
             while len(self._known) > PREDICTIONS_KEPT:

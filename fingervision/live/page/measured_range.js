@@ -9,8 +9,7 @@ const digits = (U) => Math.min(6, Math.max(1, 1 - Math.floor(Math.log10(U || 1e-
 const pm = (value, U) => (U > 0 ? `${value.toFixed(digits(U))} ± ${U.toFixed(digits(U))}` : value.toFixed(4));
 
 function words() {
-  const state = page.state, u_scale = state.u_px_per_mm === null ? null : state.u_px_per_mm / state.px_per_mm;
-  const found = statistics(gaps, ...range, u_scale);
+  const state = page.state, found = statistics(gaps, ...range);
   if (!found) return "A range needs at least two frames with a gap.";
   const parts = [
     `${found.from.toFixed(3)} to ${found.to.toFixed(3)} s, frames ${found.first} to ${found.last}, n = ${found.n}`,
@@ -21,7 +20,7 @@ function words() {
     const { n, mean, rms, U_mean } = found.residual, um = (mm) => (1e3 * mm).toFixed(1);
     parts.push(`${terms()[1]}${n < found.n ? ` of ${n} frames:` : ""} mean ${um(mean)}${U_mean === null ? "" : ` ± ${um(U_mean)}`}, RMS ${um(rms)} µm`);
   }
-  return `${parts.join(" · ")} (± at k = 2${u_scale === null ? ", from frame to frame only: the scale has no uncertainty" : ""})`;
+  return `${parts.join(" · ")} (± at k = 2${state.u_px_per_mm === null ? ", from frame to frame only: the scale has no uncertainty" : ""})`;
 }
 function show() {
   at("range_bar").hidden = !range;
