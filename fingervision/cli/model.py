@@ -55,7 +55,7 @@ Examples:
     default="corrected",
     show_default=True,
     group=MODEL,
-    help="Hinge compliance: beam theory corrected by finite elements, or beam theory alone.",
+    help="Hinge compliance of a gripper.toml: beam theory corrected by finite elements, or beam theory alone.",
 )
 @option(
     "--large-rotation",
@@ -219,7 +219,7 @@ def command(
     from fingervision.cli._model_motion import motion_asked, move
     from fingervision.cli._model_report import say_refusals, say_what_limits
     from fingervision.domain.errors import UsageError
-    from fingervision.interface.prediction import figures_csv, figures_text, predict_gripper
+    from fingervision.interface.prediction import figures_csv, figures_text, predict_gripper, refuse_beams
     from fingervision.models.answer_figures import Physics
     from fingervision.models.hinge_correction import HingeTheory
     from fingervision.models.kinds import kinds
@@ -255,6 +255,7 @@ def command(
     if is_mechanism(gripper_toml):
         from fingervision.cli._mechanism import predict
 
+        refuse_beams(gripper_toml, HingeTheory(hinge))
         predict(
             gripper_toml, kind, drive, columns, out, asked, vary, (solve, wanted),
             object_mm=object_mm, object_n_mm=object_n_mm, large_rotation=large_rotation, contact=contact, mesh=mesh,

@@ -233,8 +233,18 @@ def model(
     inputs = None if drive is None else np.unique(inputs_given(drive, columns)[1])
     physics = Physics(large_rotation=large_rotation, contact=contact)
     if is_mechanism(path):
+        refuse_beams(path, theory)
         return predict_mechanism(path, read_drawing(path), kind, inputs, physics)
     return predict_gripper(path, read_gripper(path), one_of("kind", kind, (*kinds(), ALL)), inputs, physics, theory)
+
+
+def refuse_beams(path: Path, theory: HingeTheory) -> None:
+    """Refuse beam theory for a mechanism.toml, whose results would be the same with it."""
+    if theory is HingeTheory.BEAM:
+        raise UsageError(
+            f"--hinge beam is for a gripper.toml, but {path} is a mechanism.toml, whose flexures are always corrected "
+            "by finite elements: leave out --hinge."
+        )
 
 
 def predict_gripper(

@@ -96,6 +96,8 @@ def pieces_of(layers: Mapping[int, PlanarRegion], joints: Sequence[Joint]) -> li
     for layer, region in layers.items():
         parts = parts_of(region)
         sheets += [Sheet(layer, region, part, (*parts[:n], *parts[n + 1 :])) for n, part in enumerate(parts)]
+    if not sheets:
+        return []
     pairs = [(n, n) for n in range(len(sheets))]
     for shape, numbers in joints:
         points = points_in(shape)

@@ -325,6 +325,8 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
     except FingervisionError as error:
         raise DataError(f"In {name}: {error}") from error
     outer = [piece[0].part.outline for piece in pieces]
+    if not outer:
+        raise DataError(f"The cuts of {name} must leave something of its bodies, but leave nothing; make them smaller.")
     if len(outer) != 1:
         raise DataError(
             f"The bodies of {name} must form one connected piece, but form {len(outer)}: {_pieces(mechanism, outer)}; "

@@ -33,6 +33,12 @@ def run(*arguments: str | Path) -> str:
     return result.output
 
 
+def test_beam_theory_alone_is_refused_where_it_would_change_nothing() -> None:
+    stage = GRIPPER.parents[2] / "fingervision" / "models" / "mechanisms" / "parallel_leaf_stage.toml"
+    with pytest.raises(UsageError, match="leave out --hinge"):
+        run(stage, "--kind", "lumped", "--hinge", "beam")
+
+
 def test_all_models_side_by_side(tmp_path: Path) -> None:
     given = drive(tmp_path / "drive.csv", [-0.5, 0.0, 1.5])
     rows = json.loads(run(GRIPPER, "--modes", "2", "--drive", given, "--out", tmp_path / "o", "--json"))

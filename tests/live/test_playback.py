@@ -23,9 +23,11 @@ from fingervision.frames.seeking import frame_times_s
 from fingervision.frames.source import FrameSource, open_source
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
+from fingervision.live.comparison.comparison import Comparison
 from fingervision.live.playback.playback import FrameReader, Playback
 from fingervision.live.playback.recorded import is_recording, recorded
 from fingervision.rendering import Camera, render, two_fingers
+from fingervision.storage.calibration_json import read_calibration
 from tests.live.browser import browser, needs_chromium, opened, says, shown
 from tests.waiting import until
 
@@ -394,3 +396,24 @@ def test_what_the_page_measures_is_what_the_command_gives(
     page.fill("#px_per_mm", "20")
     page.press("#px_per_mm", "Enter")
     shown(page, "document.querySelector('#place').textContent.includes('There is no')")
+
+
+@pytest.mark.slow
+def test_the_verdict_of_a_recording_is_that_of_its_own_table(tmp_path: Path) -> None:
+    """The clocks' offset is found from the motion: a table that does not say how surely has too small a U."""
+    sample = Path(__file__).parents[2] / "sample_frames" / "opening"
+    scale, log = read_calibration(sample / "calibration.json"), ("--drive", str(sample / "drive.csv"))
+    view = Playback(recorded(str(sample / "opening.mp4"), None, Choices(scale=scale), log), tmp_path / "out")
+    comparison = Comparison(view, sample / "simulation.csv")
+    view.on_table = comparison.add_all
+    view.start()
+    try:
+        found = until(lambda: comparison.verdicts.newest)
+        assert view.table is not None
+        alone = fv.diagnose(view.table, sample / "simulation.csv")
+    finally:
+        comparison.stop()
+        view.stop()
+    play, wanted = (json.loads((Path(found.report).parent / "report.json").read_text())["effects"][0], alone.effects[0])
+    assert play["parameters"]["play_mm"]["value"] == pytest.approx(wanted.parameters["play_mm"].value, rel=1e-6)
+    assert play["parameters"]["play_mm"]["u"] == pytest.approx(wanted.parameters["play_mm"].u, rel=1e-6)

@@ -121,6 +121,13 @@ direction = [1, 0]
     assert mechanism_from_tables(tomllib.loads(open_cuts), "post.toml").flexures
 
 
+def test_cuts_that_leave_nothing_are_named() -> None:
+    cleared = STAGE.replace("[[flexure]]", "[[spare]]") + "\n[[body]]\ncut = true\nbox_mm = [-500, 500, -500, 500]\n"
+    drawn = {key: value for key, value in tomllib.loads(cleared).items() if key != "spare"}
+    with pytest.raises(DataError, match="must leave something of its bodies"):
+        mechanism_from_tables(drawn, "m.toml")
+
+
 def test_a_drawing_in_metres_is_asked_about() -> None:
     drawn = tomllib.loads(STAGE)
     drawn["lengths"] = {name: value * 1e-3 for name, value in drawn["lengths"].items()}

@@ -3,9 +3,10 @@
 import json
 from collections import OrderedDict, deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from shutil import copyfile
 from threading import Event, Lock, Thread
 from typing import Any
 
@@ -16,9 +17,9 @@ from fingervision.domain.effect import Array, History
 from fingervision.live.background import BackgroundCommand
 from fingervision.live.view import View
 from fingervision.models.corrected import CorrectedModel
-from fingervision.storage.gaps_csv import GapRow
+from fingervision.storage.gaps_csv import DRIVE_COLUMNS, GapRow, GapsCsv
 from fingervision.storage.out_folder import out_folder
-from fingervision.storage.row_file import write_table as write_rows
+from fingervision.storage.summary_json import GAPS, SUMMARY
 from fingervision.tables.read import read_model
 
 # A preliminary verdict by the command `diagnose`, in a separate process while the measurement continues.
@@ -36,7 +37,6 @@ MORE_ROWS, MORE_AT_REST = 1.5, 1.1
 # Largest number of rows in a diagnosis, the newest two minutes at 25 frames per second; more rows would take longer.
 MOST_ROWS = 3000
 VERDICT = "Seeking a verdict"
-COLUMNS = ("run", "time_s", "input_mm", "gap_mm", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,10 +124,13 @@ class VerdictSeeker:
             self._thread.join()
 
     def _seek(self, rows: list[GapRow]) -> None:
-        folder = self._out / f"verdict_{self._number}"
-        table = folder / "live_samples.csv"
+        folder, whole = self._out / f"verdict_{self._number}", self._view.table
+        table = folder / GAPS
         with out_folder(folder):
-            write_table(table, rows)
+            with GapsCsv(table, DRIVE_COLUMNS) as written:
+                written.add([replace(row, run=row.run or "1") for row in rows])
+            if whole is not None:  # the summary of a recording says how sure its clock is
+                copyfile(whole.parent / SUMMARY, folder / SUMMARY)
         arguments = ("diagnose", str(table), "--model", str(self._model), "--kind", self._kind, "--out", str(folder))
         command = BackgroundCommand(*arguments)
         code, complaint = command.ended(self._ending)
@@ -157,11 +160,6 @@ def turns(rows: Sequence[GapRow], least_mm: float) -> int:
         else:
             extreme = max(extreme, at) if way > 0 else min(extreme, at) if way < 0 else extreme
     return count
-
-
-def write_table(path: Path, rows: Sequence[GapRow]) -> None:
-    """Write rows as a measured table."""
-    write_rows(path, COLUMNS, ([row.run or "1", *(getattr(row, name) for name in COLUMNS[1:])] for row in rows))
 
 
 def read_verdict(folder: Path, rows: int) -> Verdict:

@@ -51,16 +51,23 @@ on("scrub", "input", () => {
   if (performance.now() - asked > 40) { asked = performance.now(); ask({ do: "seek", frame: Number(at("scrub").value) }); }
 });
 on("scrub", "change", () => { scrubbing = false; ask({ do: "seek", frame: Number(at("scrub").value) }); });
-// A frame or a time that is typed; what is refused gives way to what is shown.
+// A frame or a time that is typed; what is refused gives way to what is shown, and so does what was obeyed.
 const typedIn = { go_frame: "frame", go_time: "time_s" };
+let held = ""; // the field in which somebody is typing
 for (const [id, name] of Object.entries(typedIn)) {
-  on(id, "change", () => { if (at(id).value.trim()) ask({ do: "seek", [name]: typed(at(id).value) }); fill(playback(), true); });
-  on(id, "focus", () => at(id).select());
+  on(id, "change", () => {
+    if (at(id).value.trim()) ask({ do: "seek", [name]: typed(at(id).value) });
+    held = "";
+    fill(playback());
+  });
+  on(id, "focus", () => { held = id; at(id).select(); });
+  on(id, "input", () => { held = id; });
+  on(id, "blur", () => { held = ""; });
 }
-function fill(now, anyway = false) {
+function fill(now) {
   const time = page.now && page.now.frame === now.frame && page.now.time_s !== null ? page.now.time_s : null;
-  if (anyway || document.activeElement !== at("go_frame")) at("go_frame").value = String(now.frame);
-  if (anyway || document.activeElement !== at("go_time")) at("go_time").value = time === null ? "" : time.toFixed(3);
+  if (held !== "go_frame") at("go_frame").value = String(now.frame);
+  if (held !== "go_time") at("go_time").value = time === null ? "" : time.toFixed(3);
 }
 function toMark(way) {
   const { frame } = playback(), all = way > 0 ? marks() : marks().reverse(), next = all.find((each) => way * (each - frame) > 0);
