@@ -58,6 +58,10 @@ class RigidBodies(ElasticMechanism):
         super().__init__(mechanism)
         self.theory, region = theory, mechanism.region
         check_mechanism(mechanism, region)
+        if not mechanism.flexures:
+            raise ModelError(
+                f"{mechanism.name} must have flexures for a stiffness matrix, but has none; take --kind finite_element."
+            )
         self._size_mm, self._near_mm = region.size_mm, _ON * region.size_mm
         by_layer = mechanism.by_layer
         spans = [span_of(flexure, by_layer[flexure.layer]) for flexure in mechanism.flexures]

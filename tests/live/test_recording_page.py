@@ -113,6 +113,8 @@ def test_picture_zooms_with_its_overlay_and_frames_are_found_by_number_time_and_
     for words, number in (("1.2", 30), ("0,24", 6), ("99", FRAMES - 1)):
         typed(page, "#go_time", words)
         is_at(page, number)
+        # The field, in which the cursor still stands, says what is shown.
+        shown(page, f"document.querySelector('#go_time').value === '{number / RATE_HZ:.3f}'")
     typed(page, "#go_frame", "the third")
     page.locator("#alarm", has_text="must be a number").wait_for()
     assert page.input_value("#go_frame") == str(FRAMES - 1)

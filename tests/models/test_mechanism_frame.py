@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fingervision.domain.errors import ModelError
 from fingervision.domain.gripper import Gripper
 from fingervision.models.answer_figures import Physics
 from fingervision.models.corotational_frame import CorotationalBody, turned_axes
@@ -79,6 +80,13 @@ def test_rigid_bodies_are_the_paper_s_matrix(gripper: Gripper) -> None:
     unit = RigidBodies(alone, theory=HingeTheory.BEAM).state(1.0)
     assert 2.0 * unit.force_n == pytest.approx(2.27, abs=0.005)
     assert 2.0 * unit.probes_mm["tip"][0] == pytest.approx(7.792, abs=0.001)
+
+
+def test_bodies_without_flexures_are_refused(gripper: Gripper) -> None:
+    alone = replace(half_mechanism(gripper), flexures=())
+    for kind in (RigidBodies, MechanismFrame):
+        with pytest.raises(ModelError, match="must have flexures"):
+            kind(alone)
 
 
 def test_both_halves_of_rigid_bodies_which_form_a_loop_are_twice_one_half(gripper: Gripper) -> None:
