@@ -68,6 +68,10 @@ class MechanismState:
     faces_mm: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
+_STEP_OF_SIZE = 1e-5
+"""Input, as a share of the drawing's size, by which the change of the largest stress is computed."""
+
+
 @dataclass(frozen=True, slots=True)
 class LargestStress:
     """Largest stress in the flexures: von Mises stress, or the nominal stress of a beam with its notch's factors.
@@ -187,7 +191,7 @@ class ElasticMechanism(MadeAgain, ABC):
 
     @abstractmethod
     def peak_stress(self, moved: Array, *, large: bool = False) -> LargestStress:
-        """Largest stress in the flexures at given displacements."""
+        """Largest stress in the flexures at given displacements; small ones are added to the shape at rest."""
 
     @abstractmethod
     def drawn_poses(self, moved: Array, *, large: bool) -> Mapping[str, BodyPose]:
@@ -248,21 +252,33 @@ class ElasticMechanism(MadeAgain, ABC):
             If the preload alone makes them yield.
         """
         system, limit = self.driven, self.mechanism.material.yield_mpa
-        by_input = self.peak_stress(system.unit_displacement).mpa
         if not np.any(system.rest_mm):
-            return limit / by_input
+            return limit / self.stress_mpa_per_mm
         at_rest = self.peak_stress(system.rest_mm).mpa
         if at_rest >= limit:
             raise ModelError(
                 f"The preload of {self.mechanism.name} must leave its flexures below the yield stress of {limit:g} "
                 f"MPa, but stresses them by {at_rest:.4g} MPa; press less."
             )
-        farthest = (limit + at_rest) / by_input
 
         def over(input_mm: float) -> float:
             return self.peak_stress(system.rest_mm + input_mm * system.unit_displacement).mpa - limit
 
+        # The stress is a convex function of the input: it exceeds every limit, the farther the input the more.
+        farthest = limit / self.stress_mpa_per_mm
+        while min(over(farthest), over(-farthest)) <= 0.0:
+            farthest *= 2.0
         return min((float(brentq(over, 0.0, sign * farthest)) for sign in (1.0, -1.0)), key=abs)
+
+    @cached_property
+    def stress_mpa_per_mm(self) -> float:
+        """Largest stress per 1 mm of input, or by how much the input raises the largest stress of a preload."""
+        system = self.driven
+        if not np.any(system.rest_mm):
+            return self.peak_stress(system.unit_displacement).mpa
+        at_rest, step_mm = self.peak_stress(system.rest_mm).mpa, _STEP_OF_SIZE * self.mechanism.region.size_mm
+        ends = (system.rest_mm + way * step_mm * system.unit_displacement for way in (1.0, -1.0))
+        return (max(self.peak_stress(end).mpa for end in ends) - at_rest) / step_mm
 
     def state(self, input_mm: float, *, large_rotation: bool = False, contact: bool = False) -> MechanismState:
         """Find the equilibrium at one input."""

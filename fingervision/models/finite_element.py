@@ -257,7 +257,9 @@ class MechanismPlate(ElasticMechanism):
         """
         if self.unstated_stress_at_mm is not None:
             return LargestStress(nan, self.unstated_stress_at_mm)
-        stress = np.where(self._in_flexure, self.plate.von_mises_mpa(moved, large=large), 0.0)
+        rest_mm = self.driven.rest_mm
+        found = self.plate.von_mises_mpa(moved, large=large, rest_mm=rest_mm if np.any(rest_mm) else None)
+        stress = np.where(self._in_flexure, found, 0.0)
         place = np.unravel_index(np.argmax(stress), stress.shape)
         x, y = self.plate.nodes_mm[:, self.plate.corner_triangles[place]]
         return LargestStress(float(stress[place]), (float(x), float(y)))

@@ -162,7 +162,7 @@ class MechanismFrame(ElasticMechanism):
         self._assemble()
         if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures):
             # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
-            loads = self._end_loads(self.driven.unit_displacement, large=False)
+            loads = self._unit_loads()
             whole = 0.5 * self.stiffness_n_mm
             self.spans = tuple(
                 span
@@ -300,7 +300,7 @@ class MechanismFrame(ElasticMechanism):
     @cached_property
     def _errors(self) -> tuple[float, float]:
         """Relative errors of force and stress: as for flexures in bending, and larger for other loads on flexures."""
-        loads, plate_mm = self._end_loads(self.driven.unit_displacement, large=False), self.mechanism.plate_mm
+        loads, plate_mm = self._unit_loads(), self.mechanism.plate_mm
         misused, every, stress = 0.0, 0.0, 0.0
         for span, own in zip(self.spans, self.segments, strict=True):
             part, whole = misused_energy(span, loads[list(own)], self.frame.end_compliance[list(own)], plate_mm)
@@ -320,11 +320,21 @@ class MechanismFrame(ElasticMechanism):
     def _end_loads(self, moved: Array, *, large: bool) -> Array:
         """Tension and end moments of all segments of the flexures.
 
-        For small displacements the segments' axes do not rotate: the loads are computed for a tiny fraction of the
-        displacements and scaled up.
+        For small displacements the segments' axes rotate no further than the preload has rotated them: the loads are
+        computed for a tiny fraction of what is added to the shape at rest, and scaled up.
         """
-        share = 1.0 if large else _TINY * self._size_mm / max(float(np.abs(moved).max()), _TINY)
-        return np.asarray(self.frame.end_loads(share * moved) / share)
+        if large:
+            return np.asarray(self.frame.end_loads(moved))
+        rest_mm = self.driven.rest_mm
+        at_rest = self.frame.end_loads(rest_mm) if np.any(rest_mm) else 0.0
+        added = moved - rest_mm
+        share = _TINY * self._size_mm / max(float(np.abs(added).max()), _TINY)
+        return np.asarray(at_rest + (self.frame.end_loads(rest_mm + share * added) - at_rest) / share)
+
+    def _unit_loads(self) -> Array:
+        """What 1 mm of input adds to the end loads."""
+        rest_mm, unit = self.driven.rest_mm, self.driven.unit_displacement
+        return self._end_loads(rest_mm + unit, large=False) - self._end_loads(rest_mm + 0.0 * unit, large=False)
 
     @cached_property
     def swaying(self) -> "MechanismFrame":

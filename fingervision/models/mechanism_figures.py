@@ -205,7 +205,7 @@ def response_figures(model: MechanismModel) -> dict[str, float]:
     unit, rest, system = model.state(1.0), model.state(0.0), model.driven
     figures = {"input_stiffness_n_mm": model.stiffness_n_mm}
     if isfinite(unit.stress_mpa):
-        figures["peak_stress_mpa_per_mm"] = model.peak_stress(system.unit_displacement).mpa
+        figures["peak_stress_mpa_per_mm"] = model.stress_mpa_per_mm
         figures["input_at_yield_mm"] = model.input_at_yield_mm
     if np.any(system.rest_mm):
         figures |= {"preload_stress_mpa": rest.stress_mpa} if isfinite(rest.stress_mpa) else {}

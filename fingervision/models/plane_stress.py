@@ -309,7 +309,7 @@ class PlaneStressPlate:
         starts = np.searchsorted(kept, np.arange(self.unknowns + 1) * self.unknowns)
         return place, kept % self.unknowns, starts
 
-    def von_mises_mpa(self, displacement_mm: Array, *, large: bool = False) -> Array:
+    def von_mises_mpa(self, displacement_mm: Array, *, large: bool = False, rest_mm: Array | None = None) -> Array:
         """Von Mises stress at the triangles' corners, shape (3, m).
 
         Parameters
@@ -318,6 +318,8 @@ class PlaneStressPlate:
             Displacement components.
         large : bool
             Whether to compute the Cauchy stress of the deformed plate; if False, the stress for small displacements.
+        rest_mm : ndarray of float, shape (unknowns,), or None
+            Displacement at rest, about which small ones are added; None for the drawn shape.
         """
         corners = skfem.Basis(self._mesh, self._element, quadrature=(_CORNERS, np.full(3, 1.0 / 6.0)))
         gradient = corners.interpolate(displacement_mm).grad
@@ -326,8 +328,13 @@ class PlaneStressPlate:
             strain = 0.5 * (mul(transpose(deformation), deformation) - eye(np.ones(gradient.shape[2:]), 2))
             area = deformation[0, 0] * deformation[1, 1] - deformation[0, 1] * deformation[1, 0]
             stress = mul(mul(deformation, _stress(strain, self._moduli)), transpose(deformation)) / area
-        else:
+        elif rest_mm is None:
             stress = _stress(_symmetric(gradient), self._moduli)
+        else:
+            turned = transpose(corners.interpolate(rest_mm).grad)
+            added = gradient - transpose(turned)
+            at_rest = _symmetric(transpose(turned)) + 0.5 * mul(turned, transpose(turned))
+            stress = _stress(at_rest + _symmetric(added + mul(turned, added)), self._moduli)
         sx, sy, txy = stress[0, 0], stress[1, 1], stress[0, 1]
         sz = self._stressed * self.material.poisson_ratio * (sx + sy)
         squares = (sx - sy) ** 2 + (sy - sz) ** 2 + (sz - sx) ** 2

@@ -33,10 +33,10 @@ def run(*arguments: str | Path) -> str:
     return result.output
 
 
-def test_beam_theory_alone_is_refused_where_it_would_change_nothing() -> None:
+def test_beam_theory_alone_is_refused_where_it_would_change_nothing(tmp_path: Path) -> None:
     stage = GRIPPER.parents[2] / "fingervision" / "models" / "mechanisms" / "parallel_leaf_stage.toml"
     with pytest.raises(UsageError, match="leave out --hinge"):
-        run(stage, "--kind", "lumped", "--hinge", "beam")
+        run(stage, "--kind", "lumped", "--hinge", "beam", "--out", tmp_path)
 
 
 def test_all_models_side_by_side(tmp_path: Path) -> None:
