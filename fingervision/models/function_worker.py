@@ -33,7 +33,7 @@ LONGEST_STEP_S = 0.01
 times per period."""
 
 
-def fmu_function(path: Path, names: Mapping[str, str]) -> "Fmu":
+def fmu_function(path: Path, names: Mapping[str, str], folder: Path) -> "Fmu":
     """Return an FMU as a function of time.
 
     Parameters
@@ -42,6 +42,8 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> "Fmu":
         Path of the `.fmu` file.
     names : mapping of str to str
         Names of the FMU's variables for `input` and `gap`, and their units `input_unit` and `gap_unit`, where stated.
+    folder : Path
+        Folder of the caller's, into which the FMU is unpacked.
 
     Raises
     ------
@@ -76,7 +78,7 @@ def fmu_function(path: Path, names: Mapping[str, str]) -> "Fmu":
         name: 1.0 if name == "force_n" else _mm("gap", variable, names.get("gap_unit"))
         for name, variable in outputs.items()
     }
-    return Fmu(extract(str(path)), description, chosen, input_mm, outputs, scales)
+    return Fmu(extract(str(path), str(folder)), description, chosen, input_mm, outputs, scales)
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,7 +259,8 @@ def main(arguments: list[str]) -> int:
     """Run the model `arguments[0]` over the runs of a file, and write its responses to another."""
     path, asked, answered, names = Path(arguments[0]), arguments[1], arguments[2], json.loads(arguments[3])
     try:
-        function = fmu_function(path, names) if path.suffix.lower() == ".fmu" else _python_function(path)
+        is_fmu = path.suffix.lower() == ".fmu"
+        function = fmu_function(path, names, Path(asked).parent / "fmu") if is_fmu else _python_function(path)
         out: dict[str, Any] = {}
         with np.load(asked) as runs:
             for k in range(len(runs.files) // 2):

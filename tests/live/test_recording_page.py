@@ -189,7 +189,7 @@ def modelled(frames: Path, tmp_path: Path) -> Iterator[str]:
     rows = [f"{number / RATE_HZ:.4f},{gap_px(number) / PX_PER_MM:.6f}" for number in range(FRAMES)]
     inputs.write_text("\n".join(["time_s,input_mm", *rows]) + "\n")
     model = tmp_path / "model.csv"
-    model.write_text("input_mm,gap_mm\n0,0\n3,3\n3.6,3.8\n")
+    model.write_text("input_mm,gap_mm\n0,0\n3,3\n3.6,5.6\n")
     log = ("--drive", str(inputs), "--drive-offset-s", "0")
     scale = stated_scale(PX_PER_MM, 0.05)
     view = Playback(recorded(str(frames), RATE_HZ, Choices(scale=scale), log), tmp_path / "out")
@@ -237,6 +237,16 @@ def saved(page: Any, button: str) -> bytes:
     return Path(download.value.path()).read_bytes()
 
 
+def charts(page: Any) -> list[dict[str, float]]:
+    """Where the gap and the residual are drawn."""
+    return [page.locator(f"{each} .u-over").bounding_box() for each in ("#chart", "#residual_chart")]
+
+
+def assert_times_stand_under_each_other(page: Any) -> None:
+    gap, residual = charts(page)
+    assert (residual["x"], residual["width"]) == pytest.approx((gap["x"], gap["width"]), abs=0.5)
+
+
 def test_graph_measures_a_range_shows_the_residual_and_exports_what_is_seen(
     modelled: str, opened: Callable[..., Any]
 ) -> None:
@@ -244,16 +254,17 @@ def test_graph_measures_a_range_shows_the_residual_and_exports_what_is_seen(
     shown(page, WHOLE)
     page.locator("#residual_chart .u-over").wait_for()
     shown(page, "document.querySelector('#model_residual').textContent.includes('RMS')")
-    gap, residual = (page.locator(f"{each} .u-over").bounding_box() for each in ("#chart", "#residual_chart"))
+    gap, residual = charts(page)
     assert residual["y"] >= gap["y"] + gap["height"]
     assert residual["height"] > 30
+    assert_times_stand_under_each_other(page)
 
     # The model is wrong where the gap is widest, and a key leads to that frame.
     page.locator("body").press("w")
     is_at(page, WIDEST)
     words = page.inner_text("#readout")
     assert float(re.search(r"residual (-?[\d.]+)", words)[1]) == pytest.approx(
-        -1e3 / 3 * (gap_px(WIDEST) / 34 - 3), abs=5
+        -1e4 / 3 * (gap_px(WIDEST) / 34 - 3), abs=5
     )
     # A click on a point of either chart shows its frame.
     box = page.locator("#residual_chart .u-over").bounding_box()

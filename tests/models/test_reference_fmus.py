@@ -4,6 +4,8 @@ by gcc.
 The published archives are in no package index; the variables are those of their modelDescription.xml.
 """
 
+import tempfile
+
 import numpy as np
 import pytest
 
@@ -45,13 +47,19 @@ NOTHING_DRIVES = {
 
 @needs_gcc
 @pytest.mark.parametrize("kind", ["cs", "me"])
-def test_feedthrough_gives_its_continuous_input_among_others_of_other_kinds(tmp_path, kind):
+def test_feedthrough_gives_its_continuous_input_among_others_of_other_kinds(tmp_path, kind, monkeypatch):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    monkeypatch.setattr(tempfile, "tempdir", None)
     pack_fmu2(tmp_path, "Feedthrough", FEEDTHROUGH, kind)
     (tmp_path / "model.toml").write_text(f'schema = 1\nbase = "Feedthrough.fmu"\n{UNITS}')
     model = read_model(tmp_path / "model.toml").base
     (answer,) = model.simulate([(TIME_S, INPUT_MM)])
     # A co-simulation that shows its input at once must not lag by half a step (2.5 um here).
     assert np.max(np.abs(answer.gap_mm - INPUT_MM)) < 1e-6
+    # Each run of a fit would leave the unpacked file there.
+    assert not list(temporary.iterdir())
 
 
 @pytest.mark.slow

@@ -6,4 +6,13 @@ export function decimals(step) {
   return digits;
 }
 export const values = (chart, places, axis, room, step) => places.map((at) => at.toFixed(decimals(step)));
-export const wide = (chart, labels) => BESIDE_PX + LETTER_PX * Math.max(4, ...(labels || []).map((label) => label.length));
+// Charts under each other have the same room beside them, so that a time stands at the same place in each.
+const charts = new Map();
+export function wide(chart, labels) {
+  const own = BESIDE_PX + LETTER_PX * Math.max(4, ...(labels || []).map((label) => label.length));
+  for (const each of charts.keys()) if (each !== chart && !each.root.offsetParent) charts.delete(each); // gone, or hidden
+  const room = Math.max(own, ...[...charts].map(([each, its]) => (each === chart ? 0 : its.own)));
+  charts.set(chart, { own, room });
+  for (const [each, its] of charts) if (its.room !== room) queueMicrotask(() => each.redraw(false, true));
+  return room;
+}
