@@ -411,9 +411,14 @@ def test_the_verdict_of_a_recording_is_that_of_its_own_table(tmp_path: Path) -> 
         found = until(lambda: comparison.verdicts.newest)
         assert view.table is not None
         alone = fv.diagnose(view.table, sample / "simulation.csv")
+        # Measured anew with as many rows, at another scale: another verdict.
+        view.choose(scale=BareScale(0.98 * scale.px_per_mm))
+        again = until(lambda: comparison.verdicts.newest if comparison.verdicts.newest is not found else None)
     finally:
         comparison.stop()
         view.stop()
     play, wanted = (json.loads((Path(found.report).parent / "report.json").read_text())["effects"][0], alone.effects[0])
     assert play["parameters"]["play_mm"]["value"] == pytest.approx(wanted.parameters["play_mm"].value, rel=1e-6)
     assert play["parameters"]["play_mm"]["u"] == pytest.approx(wanted.parameters["play_mm"].u, rel=1e-6)
+    assert again.rows == found.rows
+    assert again.sentence != found.sentence

@@ -117,6 +117,13 @@ class VerdictSeeker:
         kept = list(rows[-MOST_ROWS:])
         self._thread = self._view.supervisor.start(VERDICT, partial(self._seek, kept))
 
+    def forget(self) -> None:
+        """Discard the verdict, and stop the diagnosis that is running: their rows have been measured anew."""
+        if self._ending.is_set():
+            return
+        self.stop()
+        self._ending, self.newest, self._judged = Event(), None, 0
+
     def stop(self) -> None:
         """Stop the running diagnosis, and start no further diagnosis."""
         self._ending.set()
@@ -334,6 +341,7 @@ class Comparison:
         self._rows.clear()
         self._recent.clear()
         self._prediction.clear()
+        self.verdicts.forget()
         self._total = self._moved = self._still = 0
         for row in rows:
             if row.input_mm is not None and row.time_s is not None:
