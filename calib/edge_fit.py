@@ -528,10 +528,11 @@ class _Seen:
 
     def kept(self, data: EdgeData) -> Floats:
         """Levels without what a codec has lost of them."""
-        out = self.out
-        for share, band in zip(self.lost, data.bands, strict=True):
-            out = out - share * (band @ self.out[..., None])[..., 0]
-        return out
+        return np.asarray(self.out - np.tensordot(self.lost, self.by_lost(data), 1))
+
+    def by_lost(self, data: EdgeData) -> Floats:
+        """Each frequency's part of the levels, shape (frequencies, edges, bins)."""
+        return np.asarray(data.bands @ self.out[..., None])[..., 0]
 
 
 def derivatives(family: Family, scene: Scene, data: EdgeData, unknowns: Floats) -> tuple[Floats, Floats]:
@@ -572,12 +573,10 @@ def _derivatives(family: Family, scene: Scene, data: EdgeData, unknowns: Floats,
     side = data.side[:, None, None]
     by_optics = side * seen.blurred.by_optics(side * seen.place)
     columns.append(per_step * np.einsum("jebn,en->jeb", by_optics, seen.weights))
-    common = np.concatenate([*columns, own_columns])
-    lost = np.einsum("febc,ec->feb", data.bands, seen.out)
-    for share, band in zip(seen.lost, data.bands, strict=True):
-        common = common - share * np.einsum("ebc,jec->jeb", band, common)
-    every = data.whiten @ np.concatenate([common, -lost]).transpose(1, 2, 0)
     shared, bins = k + m + OPTICS, data.away.shape[1]
+    kept = np.eye(bins) - np.tensordot(seen.lost, data.bands, 1)
+    common = kept @ np.concatenate([*columns, own_columns]).transpose(1, 2, 0)
+    every = data.whiten @ np.concatenate([common, -seen.by_lost(data).transpose(1, 2, 0)], axis=2)
     jacobian = np.zeros((edges, bins, unknowns.size))
     jacobian[:, :, :shared] = every[:, :, :shared]
     for e in range(edges):

@@ -16,7 +16,7 @@ at("against").hidden = true;
 submit("input_form", () => ({ do: "input", input_mm: number("typed_input") }));
 on("verdict_report", "click", () => download(withToken("/verdict/report.html"), "report.html"));
 function picture() { // of the newest verdict, and only when it is looked at
-  const verdict = page.state && page.state.model && page.state.model.verdict, address = verdict && withToken(`/verdict/residuals.svg?rows=${verdict.rows}`);
+  const verdict = page.state && page.state.model && page.state.model.verdict, address = verdict && withToken(`/verdict/residuals.svg?of=${encodeURIComponent(verdict.report)}`);
   if (verdict && at("verdict_why").open && at("verdict_picture").getAttribute("src") !== address) at("verdict_picture").src = address;
 }
 on("verdict_why", "toggle", picture);
@@ -33,8 +33,9 @@ listen("state", ({ model, bed, whole }) => {
   at("against").hidden = !model;
   if (!model) return;
   say("model_residual", model.rms_um === null ? "no residual yet" : `mean residual ${um(model.mean_um)}, RMS ${um(model.rms_um)}`);
-  const input = model.input_mm === null ? "The input is not known yet." : `Input ${model.input_mm.toFixed(4)} mm.`;
-  say("model_words", `${input} ${model.samples} samples against ${model.path}${model.band_um === null ? "" : `; U of one sample ${um(model.band_um)} (k = 2)`}.`);
+  // Of a live view the newest row's; of a recording it would be the last row's, whichever frame is shown.
+  const input = model.input_mm === null ? "The input is not known yet. " : whole ? "" : `Input ${model.input_mm.toFixed(4)} mm. `;
+  say("model_words", `${input}${model.samples} samples against ${model.path}${model.band_um === null ? "" : `; U of one sample ${um(model.band_um)} (k = 2)`}.`);
   const { verdict } = model;
   const waits = model.busy ? "diagnose is at work…" : `A verdict needs 100 samples in motion, there and back: so far ${model.moved}.`;
   say("verdict_words", verdict ? `${verdict.verdict}: ${verdict.sentence} (${verdict.rows} samples)${model.busy ? " – being judged anew" : ""}` : waits);
