@@ -161,8 +161,10 @@ def run(
 
     from fingervision.interface.bed import bed as opened
     from fingervision.storage.recipe_toml import read_recipe
+    from fingervision.testbed.run.run_folder import interrupted
 
     recipe = read_recipe(recipe_toml)
+    interrupted(out, recipe)
     with opened(bed_name, hide=hide, seed=seed, real_time=real_time, after=after) as bed:
         done = bed.run(recipe, out, progress=True, say=lambda words: click.echo(words, err=True))
     if as_json:
@@ -171,7 +173,10 @@ def run(
         click.echo(json.dumps({**document, "frames_lost": counts.lost, "resumed_after": done.resumed_after}))
         return
     went_on = f", after {done.resumed_after} recorded before the interruption" if done.resumed_after else ""
-    click.echo(f"{done.counts.recorded} frames{went_on}, {done.counts.with_gap} with a gap: {out / 'samples.csv'}")
+    lost = f", {done.counts.lost} lost" if done.counts.lost else ""
+    click.echo(
+        f"{done.counts.recorded} frames{went_on}, {done.counts.with_gap} with a gap{lost}: {out / 'samples.csv'}"
+    )
     if bed.bed.model is not None:
         click.echo(f"next: fingervision diagnose {done.table} --model {out / 'simulation.csv'} --out diagnosis")
 
@@ -190,11 +195,11 @@ def check(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
     from fingervision.testbed.run.recipe_check import CheckedStep, check_recipe, planned_bed
 
     def line(step: CheckedStep) -> str:
-        gap = "" if step.gap_mm is None else f"{step.gap_mm[0]:.3f} to {step.gap_mm[1]:.3f}"
+        gap = "" if step.gap_mm is None else f"{step.gap_mm[0]:z.3f} to {step.gap_mm[1]:z.3f}"
         force = "" if step.force_n is None else f"{step.force_n:.2f}"
         return (
-            f"{step.number:>4}  {step.kind:<20} {step.from_mm:>8.3f} {step.to_mm:>8.3f} "
-            f"{f'{step.lower_mm:.3f} to {step.upper_mm:.3f}':>18} {step.speed_mm_s:>7.3g} {step.seconds:>8.1f} "
+            f"{step.number:>4}  {step.kind:<20} {step.from_mm:>z8.3f} {step.to_mm:>z8.3f} "
+            f"{f'{step.lower_mm:z.3f} to {step.upper_mm:z.3f}':>18} {step.speed_mm_s:>7.3g} {step.seconds:>8.1f} "
             f"{gap:>16} {force:>6}"
         )
 
@@ -223,7 +228,7 @@ def check(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
             f"{len(done.steps)} steps, {done.seconds:.0f} s, {frames} recorded frames at {done.bed.rate_hz:g} Hz, "
             f"up to {done.megabytes:.0f} MB of lossless video"
         )
-        if settling_s:
+        if 0.0 < settling_s < float("inf"):
             click.echo(f"each motion may take longer by up to {settling_s:g} s (settling_s)")
         speed = "any speed" if limits.speed_mm_s == float("inf") else f"{limits.speed_mm_s:g} mm/s"
         click.echo(
@@ -288,7 +293,7 @@ def move(to_mm: float, speed_mm_s: float, home_first: bool, bed_name: str) -> No
     with opened(bed_name) as bed:
         if home_first:
             bed.home()
-        click.echo(f"moved: {bed.move(to_mm, speed_mm_s):.3f} mm")
+        click.echo(f"moved: {bed.move(to_mm, speed_mm_s):z.3f} mm")
 
 
 @command.command("jog", epilog=JOG_EXAMPLES, context_settings={"ignore_unknown_options": True})
@@ -308,7 +313,7 @@ def jog(speed_mm_s: float, seconds: float | None, home_first: bool, bed_name: st
     with opened(bed_name, real_time=True) as bed:
         if home_first:
             bed.home()
-        click.echo(f"jogged: {bed.jog(speed_mm_s, inf if seconds is None else seconds):.3f} mm")
+        click.echo(f"jogged: {bed.jog(speed_mm_s, inf if seconds is None else seconds):z.3f} mm")
 
 
 @command.command("steps", epilog=STEPS_EXAMPLES)
@@ -350,7 +355,7 @@ def home(bed_name: str) -> None:
     from fingervision.interface.bed import bed as opened
 
     with opened(bed_name) as bed:
-        click.echo(f"homed: {bed.home():.3f} mm")
+        click.echo(f"homed: {bed.home():z.3f} mm")
 
 
 @command.command("stop", epilog=STOP_EXAMPLES)

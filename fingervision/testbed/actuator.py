@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
+from fingervision.domain.errors import FingervisionError
 from fingervision.domain.field import Field
 from fingervision.testbed.force_sensor import Reading
 
@@ -141,5 +142,6 @@ class Actuator(MoveCheck, Protocol):
 
 
 def in_a_line(error: Exception) -> str:
-    """An exception's class and message, in one line without a full stop."""
-    return f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
+    """An exception's message, and the class of one from elsewhere, in one line without a full stop."""
+    said = str(error) if isinstance(error, FingervisionError | RefusedError) else f"{type(error).__name__}: {error}"
+    return said.replace("\n", " ")[:200].rstrip(".")

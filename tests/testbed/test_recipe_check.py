@@ -112,3 +112,10 @@ def test_a_simulated_bed_that_is_opened_again_has_the_model_that_was_built(tmp_p
     assert other.model is not None
     assert first.model is not None
     assert other.model.respond(np.ones(1)).force_n > first.model.respond(np.ones(1)).force_n
+
+
+def test_a_recipe_with_a_screw_turned_by_hand_is_checked(tmp_path: Path) -> None:
+    (tmp_path / "bed.toml").write_text('schema = 1\n[actuator]\nkind = "hand_screw"\nlower_mm = -1\nupper_mm = 2\n')
+    done = check(tmp_path, TRIANGLE.format(to_mm=1.0, speed=0.5), "--bed", str(tmp_path / "bed.toml"))
+    assert done.exit_code == 0, done.output
+    assert "inf" not in done.output

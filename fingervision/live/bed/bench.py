@@ -144,19 +144,19 @@ class Bench:
 
     def home(self) -> None:
         """Move the stage to its reference position."""
-        self._ask(Task("homing", lambda: f"At the reference: {home(self.bed, self._looking()):.4f} mm."))
+        self._ask(Task("homing", lambda: f"At the reference: {home(self.bed, self._looking()):z.4f} mm."))
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Move the stage to a position within the limits."""
 
         def act() -> str:
-            return f"At {move(self.bed, to_mm, speed_mm_s, self._looking()):.4f} mm."
+            return f"At {move(self.bed, to_mm, speed_mm_s, self._looking()):z.4f} mm."
 
         self._ask(Task(f"moving to {to_mm:g} mm", act))
 
     def jog(self, speed_mm_s: float, for_s: float) -> None:
         """Move the stage at a signed speed for a given time, at most to the limit."""
-        self._ask(Task("jogging", lambda: f"At {jog(self.bed, speed_mm_s, for_s, looking=self._looking()):.4f} mm."))
+        self._ask(Task("jogging", lambda: f"At {jog(self.bed, speed_mm_s, for_s, looking=self._looking()):z.4f} mm."))
 
     def run(self, recipe: Recipe[Section], out: Path) -> None:
         """Run a recipe and write its results to a folder."""

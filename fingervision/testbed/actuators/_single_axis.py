@@ -335,7 +335,7 @@ class SingleAxis(FreeMoves, ABC):
         position_mm = self._asked(self._position_mm)
         if not isfinite(position_mm):
             raise DeviceError(f"{self.name} must answer with its position, but answered {position_mm}.")
-        at_mm = (position_mm - self._settings.zero_mm) * self._settings.sign
+        at_mm = (position_mm - self._settings.zero_mm) * self._settings.sign + 0.0  # no minus before a zero
         self._jump_mm, self._now_mm = max(self._jump_mm, abs(at_mm - self._now_mm)), at_mm
         if abs(at_mm - self._held_mm) > self._still_mm:
             self._held_mm, self._since_s = at_mm, self._clock.now_s()

@@ -60,7 +60,7 @@ class HandScrew(FreeMoves):
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Ask the user to turn the screw; the speed is up to the user."""
         check_move(self.limits, to_mm, speed_mm_s)
-        self._ask_for(f"Turn the screw to {to_mm:.3f} mm and type its reading in mm", to_mm)
+        self._ask_for(f"Turn the screw to {to_mm:z.3f} mm and type its reading in mm", to_mm)
 
     def jog(self, speed_mm_s: float) -> None:
         """Refuse: a hand-turned screw cannot be stopped by command."""
@@ -83,7 +83,7 @@ class HandScrew(FreeMoves):
 
     def _ask_for(self, words: str, wanted_mm: float) -> None:
         for _ in range(ASK_AT_MOST):
-            line = self._terminal.ask(f"{words} (Enter alone: {wanted_mm:.3f}): ")
+            line = self._terminal.ask(f"{words} (Enter alone: {wanted_mm:z.3f}): ")
             if line is None:
                 raise StateError(
                     "The hand screw must be turned by an operator, but there is no terminal to ask one: run "
@@ -99,7 +99,7 @@ class HandScrew(FreeMoves):
                 )
             elif abs(typed_mm - wanted_mm) > FAR_MM:
                 self._terminal.say(
-                    f"The reading must be within {FAR_MM:g} mm of {wanted_mm:.3f} mm, but is {typed_mm:g} mm.\n"
+                    f"The reading must be within {FAR_MM:g} mm of {wanted_mm:z.3f} mm, but is {typed_mm:g} mm.\n"
                 )
             else:
                 now_s = self._clock.now_s()

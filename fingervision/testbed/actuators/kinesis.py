@@ -23,6 +23,7 @@ from fingervision.testbed.actuators._single_axis import (
 )
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
+from fingervision.testbed.text_protocol.line import WRITE_S, told
 
 __all__ = ["KEYS", "SIMULATED", "KinesisStage", "build", "without_hardware"]
 KEYS = ("port", "channel", "bay", "counts_per_mm", "controller", "acceleration_mm_s2", *AXIS)
@@ -113,7 +114,7 @@ class KinesisStage(SingleAxis):
             header = HEADER.pack(message, len(data), 0, self._unit | HAS_DATA, HOST)
         else:
             header = HEADER.pack(message, first, second, self._unit, HOST)
-        self._port.write(header + data)
+        told(self._port, header + data)
 
     def _ask(self, message: int, awaited: int) -> bytes:
         """Ask for a message; messages that the controller sends unasked, such as the end of a motion, are skipped."""
@@ -147,7 +148,7 @@ def build(section: Section, context: BuildContext) -> KinesisStage:
     counts = section.number("counts_per_mm", above=0.0)
     ramp = section.number("acceleration_mm_s2", above=0.0) if "acceleration_mm_s2" in section.values else None
     try:
-        port = serial.serial_for_url(name, baudrate=BAUD, timeout=0.02, write_timeout=1.0)
+        port = serial.serial_for_url(name, baudrate=BAUD, timeout=0.02, write_timeout=WRITE_S)
     except Exception as error:  # pyserial raises exceptions of several classes
         section.refuse("port", f"must be that of a controller, but {name} could not be opened ({in_a_line(error)}).")
     unit = 0x20 + bay if bay else UNIT

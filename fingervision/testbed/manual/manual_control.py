@@ -134,7 +134,7 @@ def _watched(
             bed.check(looking.force_n(), bed.limits.force_n)
     except Interrupted:
         at_mm = looking.position_mm()
-        raise StateError(f"Stopped: the motor has stopped near {at_mm:.3f} mm.") from None
+        raise StateError(f"Stopped: the motor has stopped near {at_mm:z.3f} mm.") from None
     except FingervisionError:
         bed.actuator.stop()
         raise

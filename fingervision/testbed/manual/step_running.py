@@ -43,10 +43,10 @@ def run_sequence(data: StepData, bed_name: str, say: Callable[[str], Any]) -> No
     bed = open_bed(bed_name)
     try:
         motions = planned_sequence(data, _within(bed), from_mm=0.0)
-        say(f"homed: {manual_control.home(bed):.3f} mm")
+        say(f"homed: {manual_control.home(bed):z.3f} mm")
         for motion in motions:
             at_mm = _run(bed, motion)
-            say(f"step {motion.number}: {motion.from_mm:.3f} to {motion.to_mm:.3f} mm, at rest at {at_mm:.3f} mm")
+            say(f"step {motion.number}: {motion.from_mm:z.3f} to {motion.to_mm:z.3f} mm, at rest at {at_mm:z.3f} mm")
     finally:
         bed.close()
 
@@ -105,7 +105,7 @@ def _row(planned: PlannedMotion) -> tuple[str, ...]:
     step, motion = planned.step, planned.motion
     pushing = f"pushing {step.pushing_force_n:g} N" if step.operation is Operation.PUSHING else "moving"
     return (
-        str(planned.number), f"{planned.from_mm:.3f}", f"{planned.to_mm:.3f}",
+        str(planned.number), f"{planned.from_mm:z.3f}", f"{planned.to_mm:z.3f}",
         f"{planned.to_mm - planned.from_mm:+.3f}", pushing, f"{step.load_kg:g}",
         "cycle time" if isinstance(step.entry, CycleTime) else "speed", f"{motion.seconds:.4f}",
         f"{motion.speed_mm_s:.1f}", f"{motion.acceleration_mm_s2:.0f}", f"{motion.deceleration_mm_s2:.0f}",

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import isfinite
 
 import numpy as np
 
@@ -238,7 +239,9 @@ def check_recipe(recipe: Recipe[Section], bed: PlannedBed) -> RecipeCheck:
         steps.append(_described(number, section, own, at_mm, bed, refusal))
         legs += own
         at_mm = steps[-1].to_mm
-    frames, at_most = frames_of(legs, bed.rate_hz, bed.actuator.limits.settling_s)
+    settling_s = bed.actuator.limits.settling_s
+    # A screw that is turned by hand takes the time that it takes, in which no frame is recorded.
+    frames, at_most = frames_of(legs, bed.rate_hz, settling_s if isfinite(settling_s) else 0.0)
     megabytes = at_most * bed.size_px[0] * bed.size_px[1] * BYTES_PER_PX / 1e6
     return RecipeCheck(bed, tuple(steps), sum(step.seconds for step in steps), frames, at_most, megabytes)
 

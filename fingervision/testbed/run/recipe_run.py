@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +113,7 @@ class Runner:
             # The position of a real stage is unknown at the start: home the stage first, but only with the fingers in
             # view.
             watch.find_fingers()
-            watch.say(f"homed: {manual_control.home(watch.bed):.3f} mm")
+            watch.say(f"homed: {manual_control.home(watch.bed):z.3f} mm")
         for _ in range(FIRST_FRAMES - 1):
             watch.look()
         watch.find_fingers()
@@ -136,6 +137,8 @@ class Runner:
             if watch.ratio is not None:
                 watch.ratio.begin()
             self._do(leg, number)
+            if leg.is_continuous:
+                watch.catch_up()
             if watch.ratio is not None and watch.ratio.interval[1] < 1.0 / LARGEST_RATIO:
                 self._warn("small_motion", f"In step {leg.step}, {watch.ratio.words}, and whether the gripper is held.")
             if isinstance(leg.act, Go) and leg.act.frames is None:
@@ -151,6 +154,11 @@ class Runner:
             )
         elif LEAST_SHARE * (moved_s - ramps_s) > foreseen_s:
             self._warn_of_speed("too_slow", moved_s, foreseen_s, "or its controller keeps to a lower speed")
+        if lost := record.counts.lost:
+            words = (
+                f"{lost} frames are lost: unreadable, or missing by the camera's times and {watch.sight.rate_hz:g} Hz"
+            )
+            self._warn("frames_lost", f"{words}, because the computer was busy or the camera is slower than it states.")
         record.event(
             "clocks", "The instruments' clocks were compared with the test bed's clock.", **watch.sight.clocks()
         )
@@ -303,7 +311,12 @@ def run_recipe(
         size_px = (sight.camera.description.width_px, sight.camera.description.height_px)
         left = max(sum(leg.seconds for leg in planned) * sight.rate_hz - len(folder.rows), 0.0)
         folder.needs_room(left, size_px)
-        record = RunRecord(folder, lambda bed_s, at_once: sight.position.at(bed_s, at_once=at_once), on_row)
+        # A camera that states no rate shows no lost frame, and a screw that is turned by hand waits for the hand.
+        tells = sight.camera.description.rate_hz is not None and isfinite(bed.actuator.limits.settling_s)
+        continuous = {leg.step for leg in planned if leg.is_continuous and tells}
+        record = RunRecord(
+            folder, lambda bed_s, at_once: sight.position.at(bed_s, at_once=at_once), continuous, sight.rate_hz, on_row
+        )
         ratio = None if bed.replays or bed.model is None else MotionRatio(bed.model, bed.limits)
         watch = Watch(bed, sight, record, controls or Controls(), recipe.below_force_n, say, ratio=ratio)
         runner = Runner(planned, watch, on_progress)

@@ -106,19 +106,22 @@ def refuse_others(path: Path, held: str) -> NoReturn:
     raise OutputError(f"--out must be a new or empty folder, but {path} contains {held}: name another folder.")
 
 
-def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
-    """Find the interrupted run of this recipe on this test bed; None if there is nothing to continue.
+def _own_names() -> tuple[str, ...]:
+    return RUN, RECIPE, CALIBRATION, SIMULATION, VIDEO, SAMPLES, EVENTS
 
-    Empty files are removed. The table is truncated to the rows whose pictures are in the video, and the file of events
-    to complete lines.
+
+def interrupted(path: Path, recipe: Recipe[Section]) -> dict[str, Any] | None:
+    """Content of run.json of the interrupted run in a folder; None if there is nothing to continue.
+
+    Nothing is changed, and no test bed is needed, so that a folder is refused before a test bed is opened.
 
     Raises
     ------
     DataError, OutputError
-        The folder contains other files, a finished run, or a run of another recipe or test bed.
+        The folder contains other files, a finished run, or a run of another recipe.
     """
-    remove_empty(path, (RUN, RECIPE, CALIBRATION, SIMULATION, VIDEO, SAMPLES, EVENTS))
-    held = contents(path)
+    there = contents(path) if path.is_dir() else []
+    held = [name for name in there if name not in _own_names() or (path / name).stat().st_size]
     if not held:
         return None
     if RUN not in held:
@@ -130,13 +133,31 @@ def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
         )
     if not read_samples(path / SAMPLES):
         # No frame was recorded: the run starts again, and no data are lost.
-        (path / EVENTS).unlink(missing_ok=True)
         return None
     if about.get("recipe") != recipe.text:
         raise OutputError(
             f"The run in {path} was interrupted, and used another recipe ({about.get('name')}): continue "
             "with that recipe, or name another folder with --out."
         )
+    return about
+
+
+def remains(path: Path, recipe: Recipe[Section], digest: str) -> Remains | None:
+    """Find the interrupted run of this recipe on this test bed; None if there is nothing to continue.
+
+    Empty files are removed. The table is truncated to the rows whose pictures are in the video, and the file of events
+    to complete lines.
+
+    Raises
+    ------
+    DataError, OutputError
+        As for `interrupted`, or the run is that of another test bed.
+    """
+    remove_empty(path, _own_names())
+    about = interrupted(path, recipe)
+    if about is None:
+        (path / EVENTS).unlink(missing_ok=True)
+        return None
     if about.get("bed_digest") != digest:
         raise OutputError(
             f"The run in {path} was interrupted, and used another test bed: continue with that test bed, or "

@@ -1,7 +1,7 @@
 """Record of a run: one row and one picture per frame, in order, written as soon as the position is known."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +18,8 @@ from fingervision.testbed.run.synchronised_acquisition import Look
 # Smallest times between the last row of an earlier run and the start of a run that follows it, or that continues it
 # after an interruption.
 PAUSE_S, GAP_S = 5.0, 1.0
+# A camera may send fewer frames than the rounded rate that it states (30 for 29.97), without having lost any.
+RATE_ERROR = 0.02
 # Word in the label of a run in which the part is turned by 180 degrees.
 TURNED = "turned"
 # Columns that are those of gaps.csv.
@@ -32,7 +34,7 @@ OnRow = Callable[[SampleRow, Frame], None]
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Numbers of frames of a run by their status."""
+    """Numbers of frames of a run by their status; `lost`: unreadable, or missing between the recorded ones."""
 
     recorded: int
     with_gap: int
@@ -48,15 +50,26 @@ class RunRecord:
         Folder to which the frames are written.
     place_at : callable
         Position of the stage as a function of time.
+    continuous : collection of int
+        Recipe steps in which every frame of the camera is recorded.
+    rate_hz : float
+        Frame rate that the camera states; it tells, with the frames' times, how many are missing in these steps.
     on_row : callable, optional
         Called with every row as soon as its position is known, and its picture.
     """
 
-    def __init__(self, folder: BedRunFolder, place_at: PlaceAt, on_row: OnRow = lambda row, picture: None) -> None:
+    def __init__(
+        self, folder: BedRunFolder, place_at: PlaceAt, continuous: Collection[int], rate_hz: float,
+        on_row: OnRow = lambda row, picture: None,
+    ) -> None:  # fmt: skip
         self.folder = folder
         self._place_at, self._on_row = place_at, on_row
+        self._continuous, self._rate_hz = continuous, rate_hz
         self._run, self.turned, self._rezeroed = 1, False, False
-        self._rows = self._with_gap = self._lost = self._events = 0
+        self._rows = self._with_gap = self._unreadable = self._events = 0
+        # Intervals between the frames of continuous steps, and their sum in periods of the camera, exact and rounded.
+        self._intervals, self._whole_periods, self._periods = 0, 0, 0.0
+        self._last: SampleRow | None = None
         # Camera time at which the time in the folder is zero (None before the first frame), and the folder's time at
         # the start of this run.
         self._zero_s: float | None = None
@@ -68,7 +81,8 @@ class RunRecord:
     @property
     def counts(self) -> Counts:
         """Number of frames so far by status."""
-        return Counts(self._rows, self._with_gap, self._lost)
+        expected = max(self._whole_periods, (1.0 - RATE_ERROR) * self._periods)
+        return Counts(self._rows, self._with_gap, self._unreadable + max(0, int(expected) - self._intervals))
 
     # Start of a run.
 
@@ -90,6 +104,8 @@ class RunRecord:
         self._events = len(self.folder.events_done)
         self._rows = len(self.folder.rows)
         self._with_gap = sum(row.gap_mm is not None for row in self.folder.rows)
+        for row in self.folder.rows:
+            self._count_missing(row)
         if self.folder.rows:
             last = self.folder.rows[-1]
             self._run, how = _run_number(last) + 1, last.run.split()
@@ -116,6 +132,7 @@ class RunRecord:
         self._zero_s = row.camera_s - row.time_s
         self._rows += 1
         self._with_gap += row.gap_mm is not None
+        self._count_missing(row)
         return GapRow(0, row.time_s, row.status, gap_mm=row.gap_mm, u_random_mm=row.u_random_mm)
 
     def camera(self, *, wait: bool) -> CameraModel | None:
@@ -153,10 +170,20 @@ class RunRecord:
         self.folder.add_picture(picture, row.time_s, row.frame, seen)
         self._waiting.append((row, look.exposed_s, picture))
         self._rows += 1
+        self._count_missing(row)
 
-    def lose(self) -> None:
-        """Count a frame that could not be read."""
-        self._lost += 1
+    def lose(self, step: int) -> None:
+        """Count a frame that could not be read; in a continuous step, the frames beside it show that it is missing."""
+        self._unreadable += step not in self._continuous
+
+    def _count_missing(self, row: SampleRow) -> None:
+        last, self._last = self._last, row
+        # Between two runs, and in a step that records no frame, nobody wanted the frames.
+        if last and row.run == last.run and row.step in self._continuous and row.step - last.step <= 1:
+            periods = (row.camera_s - last.camera_s) * self._rate_hz
+            self._intervals += 1
+            self._whole_periods += round(periods)
+            self._periods += periods
 
     def write(self, *, at_once: bool = False) -> None:
         """Write the rows whose interpolated stage position (`at_once`: that of all frames) and gap are known by now."""

@@ -139,7 +139,7 @@ class Watch:
         # Between the last reading in motion and the first one after a stop, nobody knows where the stage was.
         self._end_if_stopped()
         limit_n = inf if self._closes else min(self.below_force_n, self.bed.limits.force_n)
-        self.bed.check(look.force_now_n, limit_n, f" at {self.sight.position.newest:.3f} mm")
+        self.bed.check(look.force_now_n, limit_n, f" at {self.sight.position.newest:z.3f} mm")
         return look
 
     def see(self, *, record: bool) -> tuple[Look, GapRow]:
@@ -160,12 +160,13 @@ class Watch:
         measured, outcome = self.sight.measure(item)
         if there is not None:
             return look, measured
+        step = 0 if self.leg is None else self.leg.step
         if not record:
             pass
         elif isinstance(item, LostFrame) or isinstance(outcome, LostFrame):
-            self.record.lose()
+            self.record.lose(step)
         else:
-            self.record.add(look, item, (self.sight.settings, outcome), 0 if self.leg is None else self.leg.step)
+            self.record.add(look, item, (self.sight.settings, outcome), step)
         self.record.write()
         gap_mm = measured.gap_mm
         if self.ratio is not None and gap_mm is not None and self.leg is not None and isinstance(self.leg.act, Go):
@@ -174,10 +175,16 @@ class Watch:
                 raise DeviceError(f"The test bed must move as stated, but {self.ratio.words}. The motor was stopped.")
         if gap_mm is not None and gap_mm < self.bed.limits.gap_mm and not self._closes:
             raise LimitError(
-                f"The gap must stay above {self.bed.limits.gap_mm:g} mm, but is {gap_mm:.4f} mm at "
-                f"{self.sight.position.newest:.3f} mm: the motor was stopped."
+                f"The gap must stay above {self.bed.limits.gap_mm:g} mm, but is {gap_mm:z.4f} mm at "
+                f"{self.sight.position.newest:z.3f} mm: the motor was stopped."
             )
         return look, measured
+
+    def catch_up(self) -> None:
+        """Record the frames that wait because the computer is busy: they show the motion that has ended."""
+        began_s = self.bed.clock.now_s()
+        while self.sight.is_behind() and self.see(record=True)[0].exposed_s < began_s:
+            pass
 
     def find_fingers(self) -> None:
         """Refuse to continue if the camera does not show both fingers."""

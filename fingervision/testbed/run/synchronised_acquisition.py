@@ -193,6 +193,10 @@ class Sight:
         self._ready = None if bed.replays else getattr(bed.camera, "ready", None)
         self._rows = RowMaker(self.task.scale, (description.width_px, description.height_px))
 
+    def is_behind(self) -> bool:
+        """Whether a frame waits to be looked at."""
+        return self._ready is not None and self._ready(0.0)
+
     def look(self) -> Look:
         """Wait for the next frame, read the position meanwhile, and all instruments after its arrival."""
         waited_s = 0.0

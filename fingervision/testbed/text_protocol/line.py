@@ -8,15 +8,33 @@ from typing import Any, Protocol
 
 import serial
 
-from fingervision.domain.errors import DeviceError
+from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import RefusedError, in_a_line
 from fingervision.testbed.text_protocol.words import Exchange, Words, filled
 
 KEYS = ("words", "port", "baud", "set")
 IDENTITY = "identity"
+WRITE_S = 1.0
 TRIES, LATE_S, CLOSES_S = 2, 0.1, 0.5
 """A question is asked again once, because one line in a noisy cable may be spoilt; a command never is."""
+
+
+def told(port: Any, data: bytes) -> None:
+    """Send bytes to a serial port by one write.
+
+    Raises
+    ------
+    DeviceError
+        The port took nothing for its time limit.
+    """
+    try:
+        port.write(data)
+    except serial.SerialTimeoutException as error:
+        raise DeviceError(
+            f"The device at {port.port} must take what it is told within {WRITE_S:g} s, but did not: switch it on, and "
+            "check its cable and its flow control (rtscts, xonxoff)."
+        ) from error
 
 
 class Port(Protocol):
@@ -44,13 +62,13 @@ class SerialPort:
     """A serial port by its name (`/dev/ttyUSB0`, `COM3`), or a pyserial address such as `socket://host:port`."""
 
     def __init__(self, name: str, baud: int, options: Mapping[str, Any]) -> None:
-        self._port = serial.serial_for_url(name, baudrate=baud, timeout=0.0, write_timeout=1.0, **options)
+        self._port = serial.serial_for_url(name, baudrate=baud, timeout=0.0, write_timeout=WRITE_S, **options)
         self.rest = b""
         """What came without the end of a line."""
 
-    def write(self, data: bytes) -> object:
+    def write(self, data: bytes) -> None:
         """Send bytes."""
-        return self._port.write(data)
+        told(self._port, data)
 
     def line(self, end: bytes, within_s: float) -> bytes:
         """Return the next line with its end, or an incomplete line when the time is over."""
@@ -269,5 +287,9 @@ def opened_line(section: Section, words: Words) -> Line:
         section.refuse("port", f"must be that of {words.name}, but {name} could not be opened ({in_a_line(error)}).")
     try:
         return Line(port, words)
-    except RefusedError as error:
-        raise DeviceError(f"{words.name} at {name} must accept its first words, but refused them ({error}).") from error
+    except FingervisionError:
+        raise
+    except Exception as error:  # a refusal, or one of those above
+        raise DeviceError(
+            f"{words.name} at {name} must accept its first words, but did not ({in_a_line(error)}): check its cable."
+        ) from error

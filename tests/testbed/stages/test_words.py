@@ -5,6 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+import serial
 from click.testing import CliRunner
 
 from fingervision.cli import cli
@@ -13,7 +14,7 @@ from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.manual import manual_control
 from fingervision.testbed.manual.manual_control import stop_bed
 from fingervision.testbed.text_protocol.words import known_words
-from tests.testbed.stages.emulators import Conex, Emulator, Invented, Zaber
+from tests.testbed.stages.emulators import Conex, Emulator, Invented, Wire, Zaber
 from tests.testbed.stages.stage_cases import CASES, Case, text
 
 pytestmark = pytest.mark.usefixtures("virtual")
@@ -148,6 +149,66 @@ def test_a_setting_that_was_never_read_is_not_given_back(tmp_path: Path) -> None
     device.settle()
     assert not [line for line in device.heard if "set maxspeed" in line]
     device.close()
+
+
+def invoked(*words: object) -> str:
+    done = CliRunner().invoke(cli, [str(word) for word in words])
+    return f"{done.output}{done.exception or ''}"
+
+
+@pytest.mark.parametrize("strays_mm", [0.0, 0.0004, -0.0004])
+def test_a_zero_has_no_minus(strays_mm: float, tmp_path: Path) -> None:
+    device = Invented()
+    device.plant.strays_mm = strays_mm
+    path = bed_with(EXAMPLE, device, tmp_path)
+    path.write_text(path.read_text().replace("lower_mm = -2", "reversed = true\nlower_mm = -2"), encoding="utf-8")
+    assert "homed: 0.000 mm" in invoked("bed", "home", "--bed", path)
+    device.close()
+
+
+@pytest.mark.parametrize("name", ["newport_esp", "kinesis"])
+@pytest.mark.parametrize("before", [True, False])
+def test_a_port_that_takes_nothing_is_a_sentence(
+    name: str, before: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def blocked(self: Wire, data: bytes) -> None:
+        raise serial.SerialTimeoutException("Write timeout")
+
+    device = CASES[name].make()
+    path = str(CASES[name].bed_at(tmp_path, device))
+    bed = None if before else open_bed(path)
+    monkeypatch.setattr(Wire, "write", blocked)
+    with pytest.raises(DeviceError, match="must take what it is told within 1 s, but did not: switch it on") as caught:
+        open_bed(path) if bed is None else bed.actuator.home()
+    assert "Exception" not in str(caught.value)
+    if bed is not None:
+        with pytest.raises(
+            DeviceError, match=r"must stop, .*must take what it is told within 1 s.*emergency stop"
+        ) as caught:
+            bed.actuator.stop()
+        assert "Error" not in str(caught.value)
+        bed.close()
+    device.close()
+
+
+def test_a_finished_folder_is_refused_before_the_port_is_opened(tmp_path: Path) -> None:
+    device, out = Invented(), tmp_path / "run"
+    path, recipe = bed_with(EXAMPLE, device, tmp_path), tmp_path / "recipe.toml"
+    recipe.write_text('schema = 1\n[[step]]\nkind = "move"\nto_mm = 0.1\nspeed_mm_s = 1.0\n')
+    out.mkdir()
+    (out / "run.json").write_text('{"kind": "bed run", "complete": true}')
+    assert "is finished already" in invoked("bed", "run", recipe, "--bed", path, "--out", out)
+    assert device.heard == []
+    device.close()
+
+
+def test_the_digits_of_the_manual_are_those_with_the_bit() -> None:
+    found = re.findall(r"^# moving = '(\S+)' +# (\d)$", PAGE, re.MULTILINE)
+    assert [int(bit) for _, bit in found] == [1, 2, 4, 8]
+    for words, bit in found:
+        assert [number for number in range(256) if re.search(words, f"{number:02X}")] == [
+            number for number in range(256) if number & int(bit)
+        ]
 
 
 def test_every_file_of_the_package_stands_in_the_manual() -> None:
