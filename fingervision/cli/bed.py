@@ -231,8 +231,9 @@ def check(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
         if 0.0 < settling_s < float("inf"):
             click.echo(f"each motion may take longer by up to {settling_s:g} s (settling_s)")
         speed = "any speed" if limits.speed_mm_s == float("inf") else f"{limits.speed_mm_s:g} mm/s"
+        force = "any force" if limits.force_n == float("inf") else f"{limits.force_n:g} N"
         click.echo(
-            f"limits of the test bed: {limits.lower_mm:g} to {limits.upper_mm:g} mm, {speed}, {limits.force_n:g} N, "
+            f"limits of the test bed: {limits.lower_mm:g} to {limits.upper_mm:g} mm, {speed}, {force}, "
             f"gap at least {limits.gap_mm:g} mm"
         )
     if done.refusals:
