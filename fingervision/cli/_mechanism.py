@@ -168,7 +168,7 @@ def predict(
     words = json.dumps(table, indent=2) if as_json else figures_text(mechanism.name, table, digits=6, least=44)
     click.echo(words)
     if not as_json:
-        say_drawing(mechanism)
+        say_drawing(mechanism, table[chief])
     if drawing.estimates:
         spread = mechanism_uncertainty(drawing.mechanism, drawing.estimates)
         write_uncertainty(spread, table, mechanism.name, out, as_json=as_json)

@@ -71,8 +71,10 @@ def say_refusals(refusals: Mapping[str, FingervisionError]) -> None:
         click.echo(f"{name} could not be computed: {refusal}", err=True)
 
 
-def say_drawing(mechanism: Mechanism) -> None:
-    """Print which parts are treated as flexures although the drawing does not name them, and what its drives do."""
+def say_drawing(mechanism: Mechanism, figures: Mapping[str, float]) -> None:
+    """Print what is treated as a flexure without a name, what the drives do, and the effect of the plate's width."""
+    for words in mechanism.notes:
+        click.echo(words)
     for strip in mechanism.strips:
         x, y = strip.at_mm
         click.echo(
@@ -90,6 +92,11 @@ def say_drawing(mechanism: Mechanism) -> None:
         )
     for drive in mechanism.drives:
         click.echo(drive.words)
+    if (percent := figures.get("width_effect_force_percent")) is not None:
+        click.echo(
+            f"The plate's width of {mechanism.plate_mm:g} mm restrains the flexures, which makes the force "
+            f"{percent:.2g} % higher than beam formulas with Young's modulus (plane stress)."
+        )
 
 
 def warn(

@@ -1,5 +1,6 @@
 """`fingervision model` with files of CAD programs: a drawing begun from a DXF or SVG file, and --export."""
 
+import json
 import os
 from pathlib import Path
 
@@ -33,7 +34,7 @@ name = "{name}"
 
 [[body]]
 name = "plate"
-outline = "{path}"
+outline = "{path}"{how}
 
 [[fixed]]                          # x from, x to, y from, y to of a box around the clamped part of the outline
 #? box_mm = [{x0:.6g}, {x1:.6g}, {y0:.6g}, {y0:.6g}]
@@ -47,9 +48,10 @@ across = "free"
 """
 
 
-def begin_drawing(source: Path, out: Path) -> None:
+def begin_drawing(source: Path, out: Path, layer: str, unit_mm: float | None) -> None:
     """Write NAME.toml, a drawing to complete, and NAME.png, the outline with its flexures, from a DXF or SVG file."""
-    region = PlanarRegion(read_outline(source))
+    steps, unit_words = read_outline(source, layer, unit_mm)
+    region = PlanarRegion(steps)
     strips, name = strips_of(region, ()), source.stem
     lines = [curve.at(np.linspace(curve.t0, curve.t1, 33)) for loop in region.loops for curve in loop.curves]
     points = np.concatenate(lines, axis=1)
@@ -58,7 +60,9 @@ def begin_drawing(source: Path, out: Path) -> None:
     with out_folder(out):
         (x0, y0), (x1, y1) = low, high
         path = Path(os.path.relpath(source, out)).as_posix()
-        text = _BEGUN.format(source=source.name, name=name, path=path, x0=x0, x1=x1, y0=y0, y1=y1)
+        how = f"\nlayer = {json.dumps(layer)}" * bool(layer)
+        how += "" if unit_mm is None else f"\nunit_mm = {unit_mm:g}"
+        text = _BEGUN.format(source=source.name, name=name, path=path, how=how, x0=x0, x1=x1, y0=y0, y1=y1)
         (out / f"{name}.toml").write_text(text, encoding="utf-8")
         figure, axes = framed(low, high)
         for x, y in lines:
@@ -68,6 +72,8 @@ def begin_drawing(source: Path, out: Path) -> None:
         axes.grid(alpha=0.3)
         axes.set_title(f"{name}: outline", fontsize="medium")
         figure.savefig(out / f"{name}.png", dpi=130)
+    if unit_words:
+        click.echo(unit_words)
     click.echo(
         f"{source.name}: {x1 - x0:.6g} by {y1 - y0:.6g} mm, {len(region.loops)} closed outlines, {len(strips)} strips "
         f"and notches that are flexures. Complete the lines of {out / name}.toml that begin with #?, with the help of "

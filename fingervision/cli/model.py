@@ -42,6 +42,19 @@ Examples:
 @make_command(_EPILOG)
 @click.argument("gripper_toml", metavar="DRAWING", type=FILE)
 @option(
+    "--layer",
+    metavar="NAME",
+    default="",
+    group=MODEL,
+    help="Layer of a DXF file from which a drawing is begun; all visible ones by default.",
+)
+@option(
+    "--unit-mm",
+    type=NUMBER,
+    group=MODEL,
+    help="Length in mm of the unit of a DXF or SVG file from which a drawing is begun; as the file states by default.",
+)
+@option(
     "--kind",
     type=KindName("all"),
     default="all",
@@ -176,6 +189,8 @@ Examples:
 @json_option("Print the table as JSON.")
 def command(
     gripper_toml: Path,
+    layer: str,
+    unit_mm: float | None,
     kind: str,
     drive: Path | None,
     columns: Path | None,
@@ -231,6 +246,11 @@ def command(
     if not magnify > 0.0:
         raise UsageError(f"--magnify must be a positive factor, but is {magnify:g}.")
     del colour, vector  # read where figures are drawn (`FigureStyle`)
+    if (layer or unit_mm is not None) and gripper_toml.suffix.lower() not in (".dxf", ".svg"):
+        raise UsageError(
+            f"--layer and --unit-mm must stand beside a .dxf or .svg file, but {gripper_toml} is none: state layer and "
+            "unit_mm in its [[body]]."
+        )
     asked = motion_asked(drive, columns, modes, frequency, damping, rate_hz, film=film)
     if export or gripper_toml.suffix.lower() in (".dxf", ".svg"):
         from fingervision.cli import _outline
@@ -238,7 +258,7 @@ def command(
         if export:
             _outline.export(gripper_toml, export)
         else:
-            _outline.begin_drawing(gripper_toml, results_folder(out, gripper_toml))
+            _outline.begin_drawing(gripper_toml, results_folder(out, gripper_toml), layer, unit_mm)
         return
     out = results_folder(out, gripper_toml)
     began_ns = began_in(out)

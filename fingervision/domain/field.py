@@ -65,6 +65,7 @@ class Field:
             if abs(limit) < inf
         ]  # fmt: skip
         must = f"between {self.low:g} and {self.high:g}" if inf not in (-self.low, self.high) else " and ".join(limits)
+        must = f"{self.low:g}" if self.low == self.high else must
         unit = f" {self.unit}" if self.unit else ""
         return f"must be {must}{unit}, but is {value:g}{f': {self.hint}' if self.hint else ''}"
 

@@ -18,7 +18,6 @@ from fingervision.models.condensed_bodies import (
     face_frame,
     nodes_of,
     own_modes,
-    pieces_of,
     section_frame,
 )
 from fingervision.models.corotational_frame import CorotationalBody, turned_axes
@@ -30,6 +29,7 @@ from fingervision.models.mechanism_faces import (
     driven_components,
     moves_in_the_mean,
     nodes_on,
+    pieces_of,
     supports_of,
 )
 from fingervision.models.plane_stress import PlaneStressPlate

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse import bmat, coo_matrix, csr_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import bmat, csr_matrix
 from scipy.sparse.linalg import splu
 
 from fingervision.domain.errors import ModelError
@@ -48,15 +47,6 @@ class Frame:
     at_mm: Array
     rows: csr_matrix
     motion: Array
-
-
-def pieces_of(plate: PlaneStressPlate) -> Indices:
-    """Number the connected parts of a mesh; return the part's number for every node, in the order of `nodes_mm`."""
-    nodes = plate.nodes_of_triangles
-    rows, columns = np.repeat(nodes[0], 6), nodes.T.ravel()
-    count = plate.x_dofs.size
-    graph = coo_matrix((np.ones(rows.size), (rows, columns)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def nodes_of(plate: PlaneStressPlate, frame: Frame) -> Indices:

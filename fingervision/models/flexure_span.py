@@ -47,6 +47,8 @@ high has an eighth of the compliance."""
 _AS_THIN = 1.1
 """Thickness that every section that bends must have, as a multiple of the neck's thickness: the same moment then causes
 no more stress there than in the neck."""
+_IN_NECK, _IN_SECTION = 0.98, 9
+"""Share of a section's height in which material is tested, and points across it."""
 _SAINT_VENANT = 1.5
 """Distance of a cut from the root in thicknesses: a self-balanced load of a strip decays at least as exp(-2.1 x / (t /
 2)) (Timoshenko and Goodier, article 26), to 0.2 % there."""
@@ -186,26 +188,30 @@ def span_of(flexure: Flexure, region: PlanarRegion) -> FlexureSpan:
 
 
 def _check_neck(flexure: Flexure, region: PlanarRegion) -> None:
-    """Refuse a notch that another cut makes thinner than its neck; the largest stress would not be that of the neck.
+    """Refuse a flexure that another cut makes thinner than its neck; the largest stress would not be that of the neck.
 
     Raises
     ------
     DataError
-        If material is missing in a strip of the neck's thickness along the axis, where the notch bends.
+        If material is missing in a strip of the neck's thickness along the axis, where the flexure bends.
     """
-    if not flexure.is_notch or flexure.found:
+    if flexure.kind == "leaf" or flexure.found:
         return
-    stations = np.linspace(0.0, flexure.half_length_mm, _SAMPLES)
+    stations = flexure.half_length_mm * np.linspace(-1.0, 1.0, 2 * _SAMPLES - 1)
     heights = flexure.height_mm(stations)
-    stations = stations[(heights > _AS_THIN * flexure.thickness_mm) & (heights < _BENDS * flexure.thickness_mm)]
-    stations = np.concatenate([stations, -stations])
-    half = 0.5 * _AS_THIN * flexure.thickness_mm
-    there = [region.holds(np.stack(flexure.section_mm(stations, np.full(stations.size, y)))) for y in (-half, half)]
-    missing = np.abs(stations[~(there[0] & there[1])])
-    if missing.size:
+    stations, heights = (
+        stations[heights < _BENDS * flexure.thickness_mm],
+        heights[heights < _BENDS * flexure.thickness_mm],
+    )
+    half = 0.5 * np.minimum(_IN_NECK * heights, _AS_THIN * flexure.thickness_mm)
+    points = [flexure.section_mm(stations, y * half) for y in np.linspace(-1.0, 1.0, _IN_SECTION)]
+    missing = np.any([~region.holds(np.stack(each)) for each in points], axis=0)
+    if missing.any():
+        nearest = float(min(stations[missing], key=abs))
+        x, y = flexure.section_mm(nearest)
         raise DataError(
             f"flexure {flexure.name} must be thinnest at its centre, but another cut makes it thinner "
-            f"{missing.min():.3g} mm from its centre; move the cuts apart, or take --kind finite_element."
+            f"{abs(nearest):.3g} mm from its centre, at ({x:.4g}, {y:.4g}) mm; move the cuts apart."
         )
 
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
-from fingervision.models.layers import Joint, pieces_of
+from fingervision.models.layers import Joint, pieces_of, points_in
 from fingervision.models.planar_region import Loop, PlanarRegion
 from fingervision.models.plane_shapes import Shape, box, crossings
 from fingervision.models.width_effect import force_uncertainty
 
-_SIZES_MM = (0.3, 5000.0)
+SIZES_MM = (0.3, 5000.0)
 """Sizes of flexure mechanisms, from etched silicon to large machines: drawings in metres or micrometres lie outside."""
 _OVER_DEPTH = 0.02
 """Variation of the stress over the plate's depth beside that by restraint, from wedge elements of CalculiX
@@ -196,6 +196,8 @@ class Mechanism:
     layers : tuple of tuple of int
         Numbers of the layers in which each of `bodies` lies; empty for a drawing of one layer. Every layer is as thick
         as the plate, and parts of different layers are joined only by bodies that lie in both.
+    notes : tuple of str
+        Sentences on how the drawing was read.
     mirrored : bool
         Whether bodies, flexures and faces are the right half of a mechanism whose left half is its mirror image in the
         line x = 0. Forces of drives are those of both halves; a probe with x < 0 lies on the left half.
@@ -216,6 +218,7 @@ class Mechanism:
     fused: tuple[tuple[str, str, PointMm], ...] = ()
     mirrored: bool = False
     layers: tuple[tuple[int, ...], ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def halves(self) -> float:
@@ -313,10 +316,10 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
     """
     name = mechanism.name
     size = region.size_mm
-    if not _SIZES_MM[0] <= size <= _SIZES_MM[1]:
-        unit = "metres? Multiply every length by 1000" if size < _SIZES_MM[0] else "micrometres? Divide them by 1000"
+    if not SIZES_MM[0] <= size <= SIZES_MM[1]:
+        unit = "metres? Multiply every length by 1000" if size < SIZES_MM[0] else "micrometres? Divide them by 1000"
         raise DataError(
-            f"{name} must be {_SIZES_MM[0]:g} to {_SIZES_MM[1]:g} mm large, but its bodies are {size:.3g} mm across; "
+            f"{name} must be {SIZES_MM[0]:g} to {SIZES_MM[1]:g} mm large, but its bodies are {size:.3g} mm across; "
             f"are its lengths {unit}."
         )
     by_layer = mechanism.by_layer
@@ -364,7 +367,47 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
                     f"flexures {other.name} and {flexure.name} of {name} must be apart, but overlap; remove "
                     "or move one of them."
                 )
+    _check_cuts(mechanism, by_layer)
     _check_points(mechanism, mechanism.region, by_layer)
+
+
+def _check_cuts(mechanism: Mechanism, by_layer: Mapping[int, PlanarRegion]) -> None:
+    """Refuse cuts that remove nothing, because they lie beside every body or are filled, and cuts through a neck."""
+    each = [*zip(mechanism.bodies, mechanism.layers or ((1,),) * len(mechanism.bodies), strict=True)]
+    names = (*mechanism.body_names, *[""] * len(each))
+    for place, ((added, shape), own) in enumerate(each):
+        if added or any(_removes(each[: place + 1], mechanism.flexures, by_layer[layer], layer) for layer in own):
+            continue
+        points, corners = points_in(shape), np.array([curve.start_mm for curve in shape.curves()])
+        x, y = np.round(0.5 * (corners.min(axis=0) + corners.max(axis=0)), 6) + 0.0
+        filling = [(f"flexure {f.name}", tuple(f.steps())) for f in mechanism.flexures]
+        filling += [(n or "a later body", (b,)) for (b, _), n in zip(each[place:], names[place:], strict=False) if b[0]]
+        why = "touches no body there"
+        if filled := [what for what, steps in filling if PlanarRegion(steps).holds(points).any()]:
+            why = f"is filled by {filled[0]}, which is added after it"
+        raise DataError(
+            f"The cut {names[place] or place + 1} of {mechanism.name} must remove a part of a body, but at ({x:.4g}, "
+            f"{y:.4g}) mm it {why}; move the cut, or leave it out."
+        )
+
+
+def _removes(
+    steps: Sequence[tuple[tuple[bool, Shape], tuple[int, ...]]], flexures: Sequence[Flexure], region: PlanarRegion,
+    layer: int,
+) -> bool:  # fmt: skip
+    """Whether the last of some steps, a cut, removes a part of the bodies before it that no later step fills.
+
+    Other cuts are left out, because a cut inside another does no harm.
+    """
+    (_, cut), _ = steps[-1]
+    bodies = [body for body, own in steps if body[0] and layer in own]
+    points = points_in(cut)
+    if (PlanarRegion(tuple(bodies)).holds(points) & ~region.holds(points)).any():
+        return True
+    leaves = [step for flexure in flexures if flexure.layer == layer for step in flexure.steps() if step[0]]
+    sides = [(*curve.origin, *curve.u) for curve in cut.curves()]
+    alone = PlanarRegion((*bodies, (False, cut), *leaves))
+    return any((*curve.origin, *curve.u) in sides for loop in alone.loops for curve in loop.curves)
 
 
 def _check_points(mechanism: Mechanism, region: PlanarRegion, by_layer: Mapping[int, PlanarRegion]) -> None:

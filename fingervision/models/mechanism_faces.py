@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.sparse.csgraph import connected_components
 
 from fingervision.domain.errors import DataError
 from fingervision.models.mechanism import Contact, Drive, Face, Mechanism
 from fingervision.models.mechanism_equilibrium import Actuators, DrivenMechanism
 from fingervision.models.plane_stress import PlaneStressPlate
+from fingervision.models.strips import necks_of
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -25,6 +27,8 @@ _OUTSIDE = -1e-9
 the product of two barycentric coordinates."""
 _LEVER = 1e-6
 """Lever arms across a component that are shorter than this share of the face's extent do not prevent rotation."""
+_RIGIDLY = 1e-6
+"""Largest difference between the motion that a drive prescribes and the nearest motion of a rigid body, over it."""
 
 
 def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm: float) -> Indices:
@@ -188,7 +192,81 @@ def supports_of(plate: PlaneStressPlate, mechanism: Mechanism, size_mm: float) -
                     f"Driven faces {other.face.name} and {drive.face.name} of {mechanism.name} must be apart, but "
                     "share a part of the outline; shorten one of their boxes, or leave one of them out."
                 )
-    return Supports(fixed, slides, driven)
+    supports = Supports(fixed, slides, driven)
+    _refuse_held_bodies(plate, mechanism, supports)
+    return supports
+
+
+def pieces_of(plate: PlaneStressPlate, kept: NDArray[np.bool_] | slice = slice(None)) -> Indices:
+    """Number the connected parts of a mesh, or of some of its triangles; return the number of every node's part."""
+    nodes = plate.nodes_of_triangles[:, kept]
+    rows, columns = np.repeat(nodes[0], 6), nodes.T.ravel()
+    count = plate.x_dofs.size
+    graph = coo_matrix((np.ones(rows.size), (rows, columns)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _refuse_held_bodies(plate: PlaneStressPlate, mechanism: Mechanism, supports: Supports) -> None:
+    """Refuse a drive whose body its supports and other drives hold: it deforms the body, and moves no flexure.
+
+    A body with a thin part that no flexure names may move by this part.
+
+    Raises
+    ------
+    DataError
+        If no motion of a rigid body agrees with what the faces of the driven body prescribe.
+    """
+    flexures, drives = mechanism.flexures, mechanism.drives
+    if not flexures:
+        return
+    middles = plate.nodes_mm[:, plate.corner_triangles].mean(axis=1)
+    thin = np.any([flexure.zone(mechanism.plate_mm).holds(middles) for flexure in flexures], axis=0)
+    piece = pieces_of(plate, ~thin if plate.pieces is None else slice(None))
+    faces: list[tuple[Face, Indices, tuple[str, ...], Drive | None]] = [
+        *((face, nodes, ("x", "y"), None) for face, nodes in zip(mechanism.fixed, supports.fixed, strict=True)),
+        *(
+            (face, nodes, (held,), None)
+            for (face, held), (nodes, _) in zip(mechanism.slides, supports.slides, strict=True)
+        ),
+        *((d.face, nodes, driven_components(d), d) for d, nodes in zip(drives, supports.driven, strict=True)),
+    ]
+    for drive, driven in zip(drives, supports.driven, strict=True):
+        body = np.bincount(piece[driven]).argmax()
+        own = [(face, nodes[piece[nodes] == body], *how) for face, nodes, *how in faces]
+        conditions = [(face.name, *_rigid_conditions(plate, nodes, *how)) for face, nodes, *how in own if nodes.size]
+        names, rows, values = zip(*conditions, strict=True)
+        wanted, all_rows = np.concatenate(values), np.concatenate(rows)
+        left = all_rows @ np.linalg.lstsq(all_rows, wanted, rcond=None)[0] - wanted
+        if np.abs(left).max() <= _RIGIDLY * np.abs(wanted).max():
+            continue
+        necks = [at for at, _ in necks_of(mechanism.region, flexures)]
+        nearest = [np.argmin(np.hypot(*(plate.nodes_mm - np.array([at]).T))) for at in necks]
+        if body not in piece[nearest]:
+            x, y = drive.face.middle_mm
+            raise DataError(
+                f"{drive.face.name} of {mechanism.name} must be able to move its body, but the body at ({x:.4g}, "
+                f"{y:.4g}) mm is held by {' and '.join(names)} together; drive another body, or let a [[flexure]] "
+                "divide it."
+            )
+
+
+def _rigid_conditions(
+    plate: PlaneStressPlate, nodes: Indices, components: tuple[str, ...], drive: Drive | None
+) -> tuple[Array, Array]:
+    """Conditions of a supported or driven face on the motions (x, y, rotation) of its body, and their values."""
+    x, y = plate.nodes_mm[:, nodes]
+    one, none = np.ones_like(x), np.zeros_like(x)
+    motion = {"x": np.stack([one, none, -y], axis=1), "y": np.stack([none, one, x], axis=1)}
+    shares, pushed = np.eye(nodes.size), dict.fromkeys(components, 0.0)
+    if drive is not None:
+        pushed = {c: drive.per_input * drive.direction["xy".index(c)] for c in components}
+        shares = np.full((1, nodes.size), 1.0 / nodes.size) if moves_in_the_mean(plate, nodes, drive) else shares
+    rows = [shares @ motion[component] for component in components]
+    values = [np.full(len(shares), value) for value in pushed.values()]
+    if drive is not None and drive.turns == "held":
+        rows.append(np.array([[0.0, 0.0, 1.0]]))
+        values.append(np.zeros(1))
+    return np.concatenate(rows), np.concatenate(values)
 
 
 # Frictionless contact of two faces of a mechanism: gaps between nodes and segments, and their derivatives.

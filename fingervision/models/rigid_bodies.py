@@ -168,6 +168,12 @@ class RigidBodies(ElasticMechanism):
         if left.size and left[0] < _LOOSE * np.abs(stiffness).max():
             raise ModelError(f"{mechanism.name} must be held by its fixed faces, but can move freely.")
         by_drive = np.asarray(np.linalg.pinv(conditions) @ np.vstack(values), dtype=float)
+        still = np.abs(conditions @ by_drive - np.vstack(values)).max(axis=0) > _LOOSE
+        if stuck := [drive.face.name for drive, is_still in zip(drives, still, strict=True) if is_still]:
+            raise ModelError(
+                f"{stuck[0]} of {mechanism.name} must be able to move its body, but other faces of the body hold it; "
+                "drive another body."
+            )
         system = DrivenMechanism(
             mechanism.name, lambda moved: (csr_matrix(stiffness), stiffness @ moved), lambda moved: stiffness @ moved,
             csr_matrix(free), by_drive, per_input_of(mechanism), self._no_mass,

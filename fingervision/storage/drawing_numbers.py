@@ -11,7 +11,7 @@ import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NoReturn
 
 from fingervision.domain.errors import DataError
 from fingervision.storage.csv_columns import is_number
@@ -24,12 +24,21 @@ _BINARY: Mapping[type[ast.operator], Callable[[float, float], float]] = MappingP
 )
 _FUNCTIONS: Mapping[str, Callable[[float], float]] = MappingProxyType(
     {
-        "sqrt": math.sqrt,
+        "sqrt": lambda value: value**0.5 if value >= 0.0 else _refuse(f"there is no sqrt of {value:g}"),
         "sin_deg": lambda angle: math.sin(math.radians(angle)),
         "cos_deg": lambda angle: math.cos(math.radians(angle)),
         "tan_deg": lambda angle: math.tan(math.radians(angle)),
     }
 )
+_REASONS: Mapping[type[Exception], str] = MappingProxyType(
+    {
+        SyntaxError: "it cannot be read as arithmetic",
+        ZeroDivisionError: "it divides by zero",
+        OverflowError: "its value is too large",
+        RecursionError: "it has too many parts",
+    }
+)
+"""Why an expression has no value, where Python's own words would say it in terms of a program."""
 LARGEST = 1e5
 """Largest number in a drawing: 100 m in mm, or as many degrees."""
 
@@ -55,8 +64,9 @@ def number(raw: Any, names: Mapping[str, float], what: str) -> float:
         try:
             value = _evaluated(ast.parse(raw, mode="eval").body, names)
         except (SyntaxError, ValueError, ZeroDivisionError, OverflowError, RecursionError) as error:
+            why = next((words for kind, words in _REASONS.items() if isinstance(error, kind)), str(error))
             raise DataError(
-                f"{what} must be a number or an arithmetic expression with names, but is {raw!r}: {error}."
+                f"{what} must be a number or an arithmetic expression with names, but is {raw!r}: {why}."
             ) from None
     elif isinstance(raw, bool) or not isinstance(raw, int | float):
         raise DataError(f"{what} must be a number or an arithmetic expression with names, but is {raw!r}.")
@@ -69,6 +79,10 @@ def number(raw: Any, names: Mapping[str, float], what: str) -> float:
             said = f"a whole number of {len(str(abs(raw)))} digits"
         raise DataError(f"{what} must be a number of at most {LARGEST:g}, but is {said}.")
     return value
+
+
+def _refuse(words: str) -> NoReturn:
+    raise ValueError(words)
 
 
 def _evaluated(node: ast.expr, names: Mapping[str, float]) -> float:

@@ -42,7 +42,7 @@ def read_gripper(path: Path) -> Gripper:
         The file cannot be read, a key is missing or unknown, a value is not a number, or the drawing is not a valid
         gripper.
     """
-    tables, _ = read_document(path, "gripper")
+    tables, _ = read_document(path, "drawing")
     refuse_other_file(path, tables, "the drawing of a gripper or mechanism", DRAWINGS)
     return gripper_from_tables(tables, str(path))
 

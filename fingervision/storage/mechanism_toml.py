@@ -219,7 +219,8 @@ def is_mechanism(path: Path) -> bool:
         tables = toml_of(path)
     except (OSError, ValueError):
         return False
-    return isinstance(tables.get("body"), list) or isinstance(tables.get("gripper"), dict)
+    own = not {"plate_mm", "drive", "flexure"}.isdisjoint(tables)  # a drawing whose bodies are missing or misspelt
+    return own or isinstance(tables.get("body"), list) or isinstance(tables.get("gripper"), dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,8 +318,9 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
 
     for key in ("flexure", "probe", "pair", "contact", "drive"):
         _refuse_same_names(top, key)
+    bodies = each("body", _body)
     parts = _copied(top, file, _Parts(
-        [named for steps in each("body", _body) for named in steps],
+        [named for steps, _ in bodies for named in steps],
         each("flexure", _flexure), each("fixed", _face), {probe.name: probe.at_mm for probe in file.probe},
     ))  # fmt: skip
     flexures, crossings = fused(parts.flexures)
@@ -338,6 +340,7 @@ def mechanism_from_tables(tables: Mapping[str, Any], origin: str) -> Mechanism:
         body_names=tuple(name for name, _, _ in parts.bodies),
         layers=tuple(layers for _, _, layers in parts.bodies) if is_layered else (),
         contacts=tuple(each("contact", _contact)),
+        notes=tuple(words for _, words in bodies if words),
     )
     if not any(drive.per_input for drive in mechanism.drives):
         raise DataError(f"At least one drive of {origin} must move with the input, but per_input is 0 for all of them.")
@@ -440,8 +443,11 @@ def _moved(section: Section, face: Face, place: RigidMap, suffix: str) -> Face:
     return Face(face.name + suffix, (min(xa, xb), max(xa, xb), min(ya, yb), max(ya, yb)))
 
 
-def _body(section: Section, body: BodyTable, name: str) -> list[_Step]:
-    """Steps of a body, each with its name: one shape, or the outlines of a file, of which holes have no name."""
+def _body(section: Section, body: BodyTable, name: str) -> tuple[list[_Step], str]:
+    """Steps of a body, each with its name: one shape, or the outlines of a file, of which holes have no name.
+
+    With a sentence on the unit of the file.
+    """
     if not body.in_layers or min(body.in_layers) < 1 or len(set(body.in_layers)) < len(body.in_layers):
         section.refuse(
             "in_layers", f"must be numbers from 1, each once, such as [1, 2], but is {list(body.in_layers)}."
@@ -450,9 +456,9 @@ def _body(section: Section, body: BodyTable, name: str) -> list[_Step]:
     if len(given) != 1:
         section.refuse(None, f"must have exactly one of {', '.join(_SHAPES)}, but has {' and '.join(given) or 'none'}.")
     if not body.outline:
-        return [(body.name, (not body.cut, _shape(section, body, given[0])), body.in_layers)]
-    shapes = read_outline(section.path.parent / body.outline, body.layer, body.unit_mm)
-    return [(body.name if added else "", (added != body.cut, shape), body.in_layers) for added, shape in shapes]
+        return [(body.name, (not body.cut, _shape(section, body, given[0])), body.in_layers)], ""
+    shapes, words = read_outline(section.path.parent / body.outline, body.layer, body.unit_mm)
+    return [(body.name if added else "", (added != body.cut, shape), body.in_layers) for added, shape in shapes], words
 
 
 def _shape(section: Section, body: BodyTable, key: str) -> Shape:

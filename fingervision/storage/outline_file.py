@@ -8,14 +8,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.domain.needed_library import needed_library
-from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism import SIZES_MM, Mechanism
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Curve, Point, Polygon, in_arcs
 from fingervision.models.triangulate import triangulate
@@ -36,12 +36,32 @@ _JOINED, _EQUALLY = 1e-5, 0.1
 """Distance below which two ends of lines meet, as a share of the drawing's size: CAD programs round to 6 digits; share
 of it within which two ends are equally near."""
 _MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72.0, "pc": 25.4 / 6.0}
+_LARGEST_MM = 1000.0
+"""Size above which a unit other than mm must be stated: a part of 80 mm whose header says inches would have 2 m."""
+_DXF_UNITS = {"mm": 1.0, "metres": 1000.0, "micrometres": 1e-3}
+"""Units in which mechanisms are drawn, and their length in mm."""
+_MM_WORDS = "millimeters"
 _ACROSS, _BODY = 4.0, 0.025
 """Triangles of a solid across thin parts, and their size over the body's size."""
 
 
-def read_outline(path: Path, layer: str = "", unit_mm: float | None = None) -> tuple[tuple[bool, Polygon], ...]:
-    """Read the closed outlines of a drawing, as shapes that are added (the body) or removed (its holes), in order.
+class Outline(NamedTuple):
+    """Closed outlines of a drawing.
+
+    Parameters
+    ----------
+    steps : tuple of (bool, Polygon)
+        Shapes that are added (the body) or removed (its holes), in order.
+    unit_words : str
+        Sentence on the unit of a DXF file, where only its header states it.
+    """
+
+    steps: tuple[tuple[bool, Polygon], ...]
+    unit_words: str
+
+
+def read_outline(path: Path, layer: str = "", unit_mm: float | None = None) -> Outline:
+    """Read the closed outlines of a drawing.
 
     Parameters
     ----------
@@ -56,42 +76,79 @@ def read_outline(path: Path, layer: str = "", unit_mm: float | None = None) -> t
     Raises
     ------
     DataError, InputFileError, MissingLibraryError
-        The file cannot be read, states no unit (SVG), or its lines do not form closed outlines.
+        The file cannot be read, states no unit (SVG), its lines do not form closed outlines, or the unit of its header
+        (DXF) makes a size that mechanisms do not have.
     """
     if not path.is_file():
         raise InputFileError(f"There is no drawing {path}.")
     read = {".dxf": _dxf_chains, ".svg": _svg_chains}.get(path.suffix.lower())
     if read is None:
         raise DataError(f"An outline must be a {' or '.join(OUTLINES)} file, but is {path}.")
-    chains = [chain for chain in read(path, layer, unit_mm) if chain[0]]
+    every, unit = read(path, layer, unit_mm)
+    chains = [chain for chain in every if chain[0]]
     if not chains:
         of = f" on layer {layer}" if layer else ""
         raise DataError(f"{path} must hold lines or curves{of}, but holds none.")
     loops = sorted(_closed(chains, path), key=lambda loop: -abs(_area(loop)))
     # A loop inside an odd number of others is a hole.
     depth = [sum(outer.holds(_inside(loop))[0] for outer in loops[:place]) for place, loop in enumerate(loops)]
-    return tuple((deep % 2 == 0, loop) for deep, loop in zip(depth, loops, strict=True))
+    steps = tuple((deep % 2 == 0, loop) for deep, loop in zip(depth, loops, strict=True))
+    return Outline(steps, "" if unit is None else _unit_words(path, unit, PlanarRegion(steps).size_mm))
+
+
+def _unit_words(path: Path, unit: tuple[str, float], size_mm: float) -> str:
+    """Sentence on the unit that a DXF file's header states: its words, and its length in mm.
+
+    Raises
+    ------
+    DataError
+        The outline is smaller or larger with it than mechanisms are.
+    """
+    words, mm = unit
+    least, most = SIZES_MM[0], SIZES_MM[1] if mm == 1.0 else _LARGEST_MM
+    if not least <= size_mm <= most:
+        guess = next((name for name, one in _DXF_UNITS.items() if least <= size_mm * one / mm <= _LARGEST_MM), "mm")
+        raise DataError(
+            f"{path} must be {least:g} to {most:g} mm large, but its header states {words}, with which it is "
+            f"{size_mm:.5g} mm across: are its lengths {guess}? State unit_mm = {_DXF_UNITS[guess]:g} beside it "
+            f"(--unit-mm {_DXF_UNITS[guess]:g} where a drawing is begun)."
+        )
+    if words == _MM_WORDS:
+        return ""
+    return (
+        f"{path.name}: its header states {words}, with which it is {size_mm:.4g} mm across; state unit_mm if the unit "
+        "is another."
+    )
 
 
 def _library(name: str, path: Path) -> Any:
     return needed_library(name, "outlines", f"{path} is a drawing, which")
 
 
-def _dxf_chains(path: Path, layer: str, unit_mm: float | None) -> Iterator[Chain]:
+def _dxf_chains(path: Path, layer: str, unit_mm: float | None) -> tuple[list[Chain], tuple[str, float] | None]:
     ezdxf = _library("ezdxf", path)
     try:
         document = ezdxf.readfile(path)
     except (OSError, ezdxf.DXFError, UnicodeDecodeError) as error:
         raise DataError(f"{path} must be a DXF drawing, but could not be read: {str(error).rstrip('.')}.") from error
-    if unit_mm is None:
-        unit_mm = ezdxf.units.conversion_factor(document.units, 4) if document.units else 1.0
+    unit = _dxf_unit(ezdxf.units, document.units, path) if unit_mm is None else ("", unit_mm)
     layers = {each.dxf.name.lower(): each.is_on() and not each.is_frozen() for each in document.layers}
     if layer and layer.lower() not in layers:
         raise DataError(f"{path} must have the layer {layer}, but has {', '.join(sorted(layers))}.")
-    for entity in document.modelspace():
-        own = entity.dxf.layer.lower()
-        if own == layer.lower() if layer else layers.get(own, True):
-            yield from _entity_chains(entity, unit_mm)
+    of_layer = [(entity, entity.dxf.layer.lower()) for entity in document.modelspace()]
+    shown = [entity for entity, own in of_layer if (own == layer.lower() if layer else layers.get(own, True))]
+    chains = [chain for entity in shown for chain in _entity_chains(entity, unit[1])]
+    return chains, unit if unit_mm is None else None
+
+
+def _dxf_unit(units: Any, number: int, path: Path) -> tuple[str, float]:
+    """Unit of a DXF file by the number in its header: its words, and its length in mm."""
+    if not number:
+        return "no unit, and mm are taken", 1.0
+    try:
+        return units.unit_name(number).lower(), round(units.conversion_factor(number, 4), 9)
+    except (ValueError, TypeError):
+        raise DataError(f"{path} must state a unit of length, but has the number {number}: state unit_mm.") from None
 
 
 def _entity_chains(entity: Any, unit_mm: float) -> Iterator[Chain]:
@@ -118,7 +175,7 @@ def _entity_chains(entity: Any, unit_mm: float) -> Iterator[Chain]:
             yield from _entity_chains(part, unit_mm)
 
 
-def _svg_chains(path: Path, layer: str, unit_mm: float | None) -> Iterator[Chain]:
+def _svg_chains(path: Path, layer: str, unit_mm: float | None) -> tuple[list[Chain], None]:
     svgelements = _library("svgelements", path)
     if layer:
         raise DataError(f"{path} is an SVG drawing, which has no layers: leave out layer = {layer!r}.")
@@ -133,13 +190,12 @@ def _svg_chains(path: Path, layer: str, unit_mm: float | None) -> Iterator[Chain
         mm = float(stated[1]) * _MM[stated[2]] / page.width
     else:
         raise DataError(f"The page of {path} must have a width in mm, cm or in, but has none: state unit_mm.")
-    for element in page.elements():
-        if isinstance(element, svgelements.Shape):
-            outline = svgelements.Path(element)
-            outline.reify()
-            for part in outline:
-                if not isinstance(part, svgelements.Move) and part.start != part.end:
-                    yield _chain(_svg_points(part, mm, page.height), [0.0, 0.5, 1.0])
+    shapes = [svgelements.Path(each) for each in page.elements() if isinstance(each, svgelements.Shape)]
+    for outline in shapes:
+        outline.reify()
+    parts = [part for outline in shapes for part in outline if not isinstance(part, svgelements.Move)]
+    curves = [_svg_points(part, mm, page.height) for part in parts if part.start != part.end]
+    return [_chain(curve, [0.0, 0.5, 1.0]) for curve in curves], None
 
 
 def _svg_points(part: Any, mm: float, height: float) -> Callable[[Array], Array]:
@@ -173,7 +229,8 @@ def _closed(chains: list[Chain], path: Path) -> list[Polygon]:
                 what = "ends" if not near else "branches"
                 raise DataError(
                     f"Lines of {path} must form closed outlines, but one {what} at ({end[0]:.6g}, {end[1]:.6g}) mm; "
-                    "join it there, or put construction lines on another layer and state the layer of the outline."
+                    "join it there, or put construction lines on another layer and state the outline's (layer = ... "
+                    "beside it, --layer where a drawing is begun)."
                 )
             _, n, side = near[0]
             left.discard(n)

@@ -64,6 +64,14 @@ WRONG = [
         "one at x 100 to 120, y 100 to 120 mm (stage)",
     ),
 ]
+CUT = "\n[[body]]\nname = 'slot'\ncut = true\n{shape}\n"
+CUTS = [
+    ("disc_mm = ['-apart / 2', 'leaf / 2', 0.1]", "filled by flexure left"),
+    ("box_mm = ['apart / 2', 'apart / 2 + 0.3', 10, 12]", "filled by flexure right"),
+    ("disc_mm = [0, 'leaf / 2', 2]", "at (0, 20) mm it touches no body"),
+    ("box_mm = [100, 110, 0, 5]", "at (105, 2.5) mm it touches no body"),
+]
+"""Cuts of the stage that change nothing, and what is said."""
 UNHELD = [
     ('"-block", "-block"]\n\n[drive]', "100.0, 101.0]\n\n[drive]", "must hold a part of the outline"),
     ('box_mm = ["-apart / 2 - 5", "-apart / 2 - 5", "leaf", "leaf + block"]',
@@ -78,6 +86,76 @@ def test_a_wrong_mechanism_is_one_sentence(old: str, new: str, named: str) -> No
         mechanism_from_tables(tomllib.loads(STAGE.replace(old, new, 1)), "m.toml")
     assert named in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("shape", "named"), CUTS)
+def test_a_cut_that_removes_nothing_is_refused_with_its_place(shape: str, named: str) -> None:
+    with pytest.raises(DataError) as refused:
+        mechanism_from_tables(tomllib.loads(STAGE + CUT.format(shape=shape)), "m.toml")
+    assert "cut slot of" in str(refused.value)
+    assert named in str(refused.value)
+
+
+def test_a_cut_before_its_body_is_refused_and_one_that_leaves_a_leaf_its_window_is_not() -> None:
+    early = STAGE.replace("[[body]]", CUT.format(shape="box_mm = [-2, 2, -4, -2]") + "[[body]]", 1)
+    with pytest.raises(DataError, match=r"at \(0, -3\) mm it is filled by ground, which is added after it"):
+        mechanism_from_tables(tomllib.loads(early), "m.toml")
+    block = "\n[[body]]\nname = 'block'\nbox_mm = ['-apart / 2 - 5', 'apart / 2 + 5', '-block', 'leaf + block']\n"
+    window = CUT.format(shape="box_mm = ['-apart / 2 - 6', 'apart / 2 + 6', 0, 'leaf']")
+    again = CUT.format(shape="box_mm = [-2, 2, 10, 12]").replace("slot", "hole")
+    drawn = STAGE.replace("[[flexure]]", block + window + again + "[[flexure]]", 1)
+    whole = mechanism_from_tables(tomllib.loads(STAGE), "m.toml")
+    assert MechanismPlate(mechanism_from_tables(tomllib.loads(drawn), "m.toml")).stiffness_n_mm == pytest.approx(
+        MechanismPlate(whole).stiffness_n_mm, rel=1e-3
+    )
+
+
+@pytest.mark.parametrize("hole", ["disc_mm = [5.8, 15, 0.1]", "box_mm = [4.9, 5.1, 15.6, 15.8]"])
+def test_a_hole_in_a_neck_is_refused(hole: str) -> None:
+    text = f"""
+name = "post"
+plate_mm = 3.0
+{STAGE[STAGE.index("[material]") : STAGE.index("[lengths]")]}
+[[body]]
+box_mm = [0, 10, 0, 30]
+{CUT.format(shape=hole.replace("5.8, 15", "5, 15.8"))}
+[[flexure]]
+name = "neck"
+kind = "circular"
+at_mm = [5, 15]
+axis_deg = 90
+thickness_mm = 1.0
+radius_mm = 5.0
+[[fixed]]
+box_mm = [0, 10, 0, 0]
+[drive]
+box_mm = [0, 10, 30, 30]
+direction = [1, 0]
+"""
+    with pytest.raises(DataError, match=r"flexure neck must be thinnest at its centre, but .* at \(5, 15\.[67]"):
+        MechanismFrame(mechanism_from_tables(tomllib.loads(text), "post.toml"))
+
+
+@pytest.mark.parametrize(("raw", "said"), [
+    ("10 +", "cannot be read as arithmetic"), ("(3", "cannot be read as arithmetic"), ("1 / 0", "divides by zero"),
+    ("sqrt(-2)", "no sqrt of -2"), ("1e308 * 1e308 * 0", "nan"),
+])  # fmt: skip
+def test_an_expression_without_a_value_is_refused_in_words_of_arithmetic(raw: str, said: str) -> None:
+    with pytest.raises(DataError, match=said) as refused:
+        number(raw, {}, "lengths.t in m.toml")
+    assert not any(word in str(refused.value) for word in ("unknown>", "line 1", "syntax", "domain", "float"))
+
+
+def test_bodies_that_are_misspelt_are_those_of_a_mechanism(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text("schema = 2\n" + STAGE.replace("schema = 1\n", ""))
+    with pytest.raises(DataError, match=r"schema in .* must be 1, but is 2"):
+        read_mechanism(path)
+    path.write_text(STAGE.replace("[[body]]", "[[bodies]]"))
+    said = CliRunner().invoke(command, [str(path), "--out", str(tmp_path / "o")]).exception
+    assert "did you mean body?" in str(said)
+    said = CliRunner().invoke(command, [str(tmp_path / "none.toml"), "--out", str(tmp_path / "o")]).exception
+    assert "There is no drawing" in str(said)
 
 
 @pytest.mark.slow

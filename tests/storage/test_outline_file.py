@@ -1,12 +1,15 @@
 """Outlines from and to DXF, SVG and STL, against drawings written by other programs' libraries and closed forms."""
 
+import tomllib
 from math import pi
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import fingervision
+from fingervision.cli.model import command
 from fingervision.domain.errors import DataError, FingervisionError, UsageError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.gripper_mechanism import whole_mechanism
@@ -116,6 +119,43 @@ def test_lines_that_do_not_close_are_refused_with_their_place(dxf: Path) -> None
         read_outline(dxf.parent / "text.dxf")
 
 
+@pytest.mark.parametrize(("unit", "factor", "said"), [
+    (0, 1e-3, r"0\.041\d* mm across: are its lengths metres\? State unit_mm = 1000"),
+    (1, 1.0, r"states inches, with which it is 10\d\d\.?\d* mm across: are its lengths mm\? State unit_mm = 1 "),
+    (0, 1e3, r"are its lengths micrometres\? State unit_mm = 0\.001"),
+    (21, 1.0, "must state a unit of length"),
+])  # fmt: skip
+def test_a_unit_that_makes_no_mechanism_is_asked_about(unit: int, factor: float, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "part.dxf"
+    document = ezdxf.new(units=unit)
+    document.modelspace().add_lwpolyline(factor * np.array(PARTS), close=True)
+    document.saveas(path)
+    begun = CliRunner().invoke(command, [str(path), "--out", str(tmp_path / "begun")])
+    assert begun.exit_code == 1
+    with pytest.raises(DataError, match=said):
+        read_outline(path)
+    stated = read_outline(path, unit_mm=1.0 / factor)
+    assert area_mm2(PlanarRegion(stated.steps)) == pytest.approx(310.0)
+    assert not stated.unit_words
+
+
+def test_a_drawing_is_begun_from_one_layer_and_says_its_unit(dxf: Path) -> None:
+    out = dxf.parent / "begun"
+    refused = CliRunner().invoke(command, [str(dxf), "--out", str(out)])
+    assert "--layer" in str(refused.exception)
+    begun = CliRunner().invoke(command, [str(dxf), "--layer", "0", "--out", str(out)])
+    assert begun.exit_code == 0
+    assert "part.dxf: its header states inches, with which it is 41.23 mm across" in begun.output
+    text = (out / "part.toml").read_text()
+    body = tomllib.loads(text)["body"][0]
+    assert body["layer"] == "0"
+    path = out / "mechanism.toml"
+    path.write_text(REST + "[[body]]\n" + text[text.index("outline =") :].partition("\n\n")[0])
+    said = CliRunner().invoke(command, [str(path), "--kind", "lumped", "--out", str(out / "o")])
+    assert "its header states inches" in said.output
+    assert CliRunner().invoke(command, [str(path), "--layer", "0"]).exit_code != 0
+
+
 def test_polylines_splines_and_blocks_are_read(tmp_path: Path) -> None:
     document = ezdxf.new(units=0)
     block = document.blocks.new("slot")
@@ -127,11 +167,11 @@ def test_polylines_splines_and_blocks_are_read(tmp_path: Path) -> None:
     angles = np.linspace(0, 2 * pi, 40)
     space.add_spline([(15 + 22 * np.cos(a), 8 + 14 * np.sin(a)) for a in angles]).closed = False
     document.saveas(tmp_path / "part.dxf")
-    steps = read_outline(tmp_path / "part.dxf")
+    steps, _ = read_outline(tmp_path / "part.dxf")
     assert [added for added, _ in steps] == [True, False, False, False]
     expected = pi * 22 * 14 - 2 * (8 + pi) - 9 * pi
     assert area_mm2(PlanarRegion(steps)) == pytest.approx(expected, rel=1e-4)
-    assert area_mm2(PlanarRegion(read_outline(tmp_path / "part.dxf", unit_mm=10.0))) == pytest.approx(
+    assert area_mm2(PlanarRegion(read_outline(tmp_path / "part.dxf", unit_mm=10.0).steps)) == pytest.approx(
         100.0 * expected, rel=1e-4
     )
 
@@ -144,7 +184,7 @@ def test_an_svg_page_is_read_in_its_unit_with_y_upwards(tmp_path: Path) -> None:
         "</svg>"
     )
     path.write_text(text)
-    steps = read_outline(path)
+    steps, _ = read_outline(path)
     region = PlanarRegion(steps)
     assert [added for added, _ in steps] == [True, False]
     assert area_mm2(region) == pytest.approx(50 * 20 - (4 - pi) * 2.5**2 - 25 * pi, rel=1e-5)
@@ -152,14 +192,14 @@ def test_an_svg_page_is_read_in_its_unit_with_y_upwards(tmp_path: Path) -> None:
     path.write_text(text.replace('width="10cm" height="50mm" ', ""))
     with pytest.raises(DataError, match="unit_mm"):
         read_outline(path)
-    assert area_mm2(PlanarRegion(read_outline(path, unit_mm=0.5))) == pytest.approx(area_mm2(region), rel=1e-5)
+    assert area_mm2(PlanarRegion(read_outline(path, unit_mm=0.5).steps)) == pytest.approx(area_mm2(region), rel=1e-5)
 
 
 @pytest.mark.parametrize("ending", [".dxf", ".svg"])
 def test_what_is_written_is_read_again(ending: str, tmp_path: Path) -> None:
     mechanism = drawn(tmp_path, SHAPES)
     write_outline(tmp_path / f"out{ending}", mechanism)
-    again = PlanarRegion(read_outline(tmp_path / f"out{ending}"))
+    again = PlanarRegion(read_outline(tmp_path / f"out{ending}").steps)
     assert area_mm2(again) == pytest.approx(area_mm2(mechanism.region), rel=1e-5)
     points = np.random.default_rng(4).uniform((-1.0, -1.0), (41.0, 11.0), (4000, 2)).T
     assert np.mean(again.holds(points) != mechanism.region.holds(points)) < 1e-3
@@ -170,7 +210,7 @@ def test_sides_shorter_than_ends_may_be_apart_are_read(tmp_path: Path) -> None:
     gripper = read_gripper(MICRO)
     mechanism = whole_mechanism(gripper, gripper, "gripper")
     write_outline(tmp_path / "gripper.dxf", mechanism)
-    again = PlanarRegion(read_outline(tmp_path / "gripper.dxf"))
+    again = PlanarRegion(read_outline(tmp_path / "gripper.dxf").steps)
     assert area_mm2(again) == pytest.approx(area_mm2(mechanism.region), rel=1e-4)  # corners move by 80 nm at most
 
 
