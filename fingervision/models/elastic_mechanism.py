@@ -177,6 +177,11 @@ class ElasticMechanism(MadeAgain, ABC):
         return self.driven
 
     @property
+    def in_plane_stress(self) -> "ElasticMechanism | None":
+        """The same model without the restraint of the flexures by the plate's width; None if it has no such model."""
+        return None
+
+    @property
     @abstractmethod
     def swaying(self) -> "ElasticMechanism":
         """The half of a mirrored drawing whose other half moves the same way sideways (`Mechanism.swaying`)."""

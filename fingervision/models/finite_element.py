@@ -216,6 +216,11 @@ class MechanismPlate(ElasticMechanism):
         """Nodes of every contact's face, shape (2, k) each."""
         return tuple(self.plate.nodes_mm[:, pair.nodes] for pair in self._pairs)
 
+    @property
+    def in_plane_stress(self) -> "MechanismPlate":
+        """The same mesh without the restraint of the flexures by the plate's width."""
+        return MechanismPlate(self.mechanism, width_effect=False, mesh=self.mesh)
+
     @cached_property
     def swaying(self) -> "MechanismPlate":
         """The half of a mirrored drawing whose other half moves the same way sideways."""

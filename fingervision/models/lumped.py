@@ -336,6 +336,11 @@ class MechanismFrame(ElasticMechanism):
         rest_mm, unit = self.driven.rest_mm, self.driven.unit_displacement
         return self._end_loads(rest_mm + unit, large=False) - self._end_loads(rest_mm + 0.0 * unit, large=False)
 
+    @property
+    def in_plane_stress(self) -> "MechanismFrame":
+        """The same mechanism without the restraint of the flexures by the plate's width."""
+        return MechanismFrame(self.mechanism, width_effect=False, theory=self.theory, mesh=self._mesh)
+
     @cached_property
     def swaying(self) -> "MechanismFrame":
         """The half of a mirrored drawing whose other half moves the same way sideways."""

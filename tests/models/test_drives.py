@@ -1,5 +1,6 @@
 """What a driven face may do, against structured quadrilaterals of second order that share nothing with the models."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.mechanism_toml import read_mechanism
 
 E, NU, PLATE_MM = 1000.0, 0.3, 2.0
+ROD = 'across = "free"'
 FORCE = 0.007
 """Of plane stress at a leaf's sharp roots, where the quadrilaterals are 0.25 mm large."""
 LEVER = """
@@ -126,8 +128,56 @@ def test_what_a_drive_cannot_do_is_refused(tmp_path: Path) -> None:
         lever(tmp_path, "40, 50, 10, 10", 'turns = "often"')
 
 
+@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame, RigidBodies])
+@pytest.mark.parametrize(("box", "more"), [
+    ("5, 10, 10, 10", ""),  # the foot, which is clamped
+    ("40, 50, 10, 10", "[[slide]]\nname = 'rail'\nbox_mm = [59, 60, 0, 0]\nholds = 'y'\n"
+                       "[[slide]]\nbox_mm = [20, 21, 10, 10]\nholds = 'y'"),
+])  # fmt: skip
+def test_a_drive_whose_body_is_held_is_refused_with_its_place(tmp_path: Path, kind: type, box: str, more: str) -> None:
+    stuck = lever(tmp_path, box, f"{ROD}\n{more}")
+    with pytest.raises((DataError, ModelError), match=r"drive of .* must be able to move its body") as refused:
+        kind(stuck).state(1.0)
+    if kind is not RigidBodies:
+        assert ("(7.5, 10) mm" if not more else "(45, 10) mm") in str(refused.value)
+        assert ("rail" if more else "fixed 1") in str(refused.value)
+
+
+def test_drives_and_rails_that_agree_with_a_rigid_motion_are_computed(tmp_path: Path) -> None:
+    """A rail across the drive, and a second drive that moves the body the same way, hold nothing."""
+    beside = "[[slide]]\nbox_mm = [60, 60, 5, 5.5]\nholds = 'x'"
+    assert MechanismPlate(lever(tmp_path, "40, 50, 10, 10", f"{ROD}\n{beside}")).stiffness_n_mm > 0.0
+    both = f"{ROD}\nname = 'left'\n[[drive]]\nname = 'right'\nbox_mm = [52, 58, 10, 10]\ndirection = [0, 1]\n{ROD}"
+    path = tmp_path / "mechanism.toml"
+    path.write_text(LEVER.replace("[drive]", "[[drive]]").format(box="40, 50, 10, 10", how=both))
+    assert MechanismPlate(read_mechanism(path)).stiffness_n_mm > 0.0
+
+
+def test_a_body_that_bends_at_a_part_without_a_name_is_not_held(tmp_path: Path) -> None:
+    """A curved spring is no strip, but as thin as the leaf beside it."""
+    ring = "[[body]]\nname='ring'\ndisc_mm=[35,-19,{r}]\ncut={cut}\n"
+    bodies = "[[body]]\nname='foot'\nbox_mm=[0,10,-30,10]\n" + ring.format(r=20.5, cut="false")
+    bodies += ring.format(r=19.5, cut="true") + "[[body]]\nname='stem'\nbox_mm=[5,16,-22,-16]\n"
+    text = LEVER.replace('[[body]]\nname = "foot"\nbox_mm = [0, 10, 0, 10]\n', bodies)
+    path = tmp_path / "mechanism.toml"
+    path.write_text(text.format(box="35.5, 40, -40, -39", how=ROD))
+    curved = MechanismPlate(read_mechanism(path))
+    assert 0.0 < curved.stiffness_n_mm < 10.0
+
+
+@pytest.mark.parametrize(("plate_mm", "wedges_n_mm", "narrower"), [(5.0, 0.0198431, 0.02), (20.0, 0.0834405, 0.07)])
+def test_the_stated_error_holds_wedges_of_a_wide_plate(
+    tmp_path: Path, plate_mm: float, wedges_n_mm: float, narrower: float
+) -> None:
+    """Force of CalculiX's quadratic wedges, three layers through half the plate; plane stress alone is too soft."""
+    drawn = replace(lever(tmp_path, "59, 60, 10, 10", ROD), plate_mm=plate_mm)
+    for kind in (MechanismPlate, MechanismFrame):
+        model = kind(drawn)
+        assert model.stiffness_n_mm == pytest.approx(wedges_n_mm, rel=model.force_error)
+        assert model.in_plane_stress.stiffness_n_mm < (1.0 - narrower) * wedges_n_mm
+
+
 SOFT_N_MM = 0.5
-ROD = 'across = "free"'
 KINDS = (MechanismPlate, MechanismFrame, RigidBodies)
 
 
