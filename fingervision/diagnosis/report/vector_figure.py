@@ -35,7 +35,7 @@ def write_vector(figure: Figure, stem: Path) -> tuple[Path, ...]:
         with plain_style():
             figure.savefig(path, format=kind, metadata=metadata)
         # One layout serves every format; it takes longer than drawing.
-        figure.set_layout_engine("none")
+        figure.set_layout_engine(None)
         written.append(path)
     return tuple(written)
 
