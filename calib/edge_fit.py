@@ -37,6 +37,8 @@ START_WIDENED = (1.0 + 0.25 * START_DISC**2) ** 0.5
 REACH_SIGMAS, REACH_EXTRA_PX, FAR = 4.0, 3.0, 3
 # Steps of the Levenberg-Marquardt fit, change of the cost below which it has converged, and step of the derivatives.
 MOST_STEPS, CONVERGED, STEP = 25, 0.02, 1e-4
+# Largest reduction of the damping after a step, and the least damping.
+EASIER, LEAST_DAMPING = 0.1, 1e-7
 # Length over which what lies on an edge is correlated (pixels).
 STRUCTURE_PX = 1.5
 # What a codec leaves on an edge: length over which it is correlated (pixels), and how many times larger it is at the
@@ -143,7 +145,8 @@ class EdgeData:
     sigma : float
         Blur of the edges from their steepest places (pixels).
     bands : ndarray of float, shape (frequencies, edges, bins, bins)
-        Matrices that take the levels to their part of each frequency of a codec's transform.
+        Matrices that take the levels to their part of each frequency of a codec's transform, and make it independent as
+        `whiten` does.
     u_lost : ndarray of float, shape (frequencies,)
         Prior standard deviations of the shares that the codec has lost.
     log_scale : float
@@ -240,7 +243,7 @@ class EdgeData:
             np.array([profile.is_outer for profile in profiles]),
             np.array([profile.ends for profile in profiles]),
             sigma,
-            _bands(away, sizes) if len(steps) else np.zeros((0, *whiten.shape)),
+            whiten @ _bands(away, sizes) if len(steps) else np.zeros((0, *whiten.shape)),
             _u_lost(sigma, contrast, np.array(steps)),
             log_scale,
             discrepancy > 0.0 or bool(structure.any()),
@@ -363,18 +366,23 @@ def fitted(
         jacobian = _derivatives(family, scene, data, unknowns, seen)
         gradient = jacobian.T @ residual + precision @ (unknowns - mean)
         hessian = jacobian.T @ jacobian + precision
-        gained = 0.0
+        gained, harder = 0.0, 2.0
         while damping < 1e6:
             step = np.linalg.solve(hessian + damping * np.diag(np.diag(hessian)), -gradient)
+            foretold = -float(step @ (gradient + 0.5 * hessian @ step))
             tried = unknowns + step
             new = _Seen.of(family, scene, data, tried)
             left = new.residual(data)
             tried_cost = _cost(left, tried, mean, precision)
             if tried_cost < cost:
                 gained, unknowns, seen, residual, cost = cost - tried_cost, tried, new, left, tried_cost
-                damping = max(0.1 * damping, 1e-9)
+                # Damping by how well the gain was foretold: Nielsen, IMM-REP-1999-05, Technical University of Denmark.
+                damping = max(damping * max(EASIER, 1.0 - (2.0 * gained / foretold - 1.0) ** 3), LEAST_DAMPING)
                 break
-            damping *= 10.0
+            # A smaller step would gain even less.
+            if foretold < CONVERGED:
+                break
+            damping, harder = damping * harder, 2.0 * harder
         if gained < CONVERGED:
             break
     jacobian = _derivatives(family, scene, data, unknowns, seen)
@@ -524,14 +532,11 @@ class _Seen:
 
     def residual(self, data: EdgeData) -> Floats:
         """Modelled minus measured level of every bin, made independent and of unit variance."""
-        return _whitened(data, self.kept(data) - data.level).ravel()
-
-    def kept(self, data: EdgeData) -> Floats:
-        """Levels without what a codec has lost of them."""
-        return np.asarray(self.out - np.tensordot(self.lost, self.by_lost(data), 1))
+        kept = _whitened(data, self.out - data.level) - np.tensordot(self.lost, self.by_lost(data), 1)
+        return np.asarray(kept.ravel())
 
     def by_lost(self, data: EdgeData) -> Floats:
-        """Each frequency's part of the levels, shape (frequencies, edges, bins)."""
+        """Each frequency's part of the levels, made independent, shape (frequencies, edges, bins)."""
         return np.asarray(data.bands @ self.out[..., None])[..., 0]
 
 
@@ -574,9 +579,9 @@ def _derivatives(family: Family, scene: Scene, data: EdgeData, unknowns: Floats,
     by_optics = side * seen.blurred.by_optics(side * seen.place)
     columns.append(per_step * np.einsum("jebn,en->jeb", by_optics, seen.weights))
     shared, bins = k + m + OPTICS, data.away.shape[1]
-    kept = np.eye(bins) - np.tensordot(seen.lost, data.bands, 1)
-    common = kept @ np.concatenate([*columns, own_columns]).transpose(1, 2, 0)
-    every = data.whiten @ np.concatenate([common, -seen.by_lost(data).transpose(1, 2, 0)], axis=2)
+    weigh = data.whiten - np.tensordot(seen.lost, data.bands, 1) if len(data.bands) else data.whiten
+    common = weigh @ np.concatenate([*columns, own_columns]).transpose(1, 2, 0)
+    every = np.concatenate([common, -seen.by_lost(data).transpose(1, 2, 0)], axis=2)
     jacobian = np.zeros((edges, bins, unknowns.size))
     jacobian[:, :, :shared] = every[:, :, :shared]
     for e in range(edges):

@@ -15,6 +15,7 @@ from calib.edge_fit import (
     derivatives,
     edge_width,
     fitted,
+    prior_mean,
     priors,
     with_placed_edges,
     with_smoothing,
@@ -172,11 +173,14 @@ def is_more_beside(
     unknowns = np.concatenate([fit.parameters, np.zeros(probes), fit.edges])
     residual, jacobian = derivatives(family, PROBE, data, unknowns)
     tried, own = jacobian[:, k : k + probes], np.delete(jacobian, np.s_[k : k + probes], axis=1)
-    hessian = own.T @ own + priors(family, NOTHING, data)
+    precision = priors(family, NOTHING, data)
     tried = tried / np.linalg.norm(tried, axis=0)
     mixed = own.T @ tried
-    information = tried.T @ tried - mixed.T @ np.linalg.solve(hessian, mixed)
-    variance, axes = np.linalg.eigh(information)
+    taken_up = np.linalg.solve(own.T @ own + precision, mixed)
+    # What the fit itself has left to gain is not the scene's.
+    own_unknowns = np.concatenate([fit.parameters, fit.edges])
+    left = own.T @ residual + precision @ (own_unknowns - prior_mean(family, NOTHING, data))
+    variance, axes = np.linalg.eigh(tried.T @ tried - mixed.T @ taken_up)
     is_told = variance > LEAST_TOLD * variance[-1]
-    score = (axes.T @ (tried.T @ residual))[is_told] / np.sqrt(variance[is_told])
+    score = (axes.T @ (tried.T @ residual - taken_up.T @ left))[is_told] / np.sqrt(variance[is_told])
     return bool(score @ score > chdtri(np.count_nonzero(is_told), FALSE_ALARMS))
