@@ -1,8 +1,8 @@
 """What every test shares: one hypothesis profile, so that the same commit always tests the same examples; Ctrl-C.
 
 With `-n`, each worker gets tests in a row and takes from others when it has none left, so that a fixture of a module is
-made once and not by every worker. With `-n auto`, there is one worker more than processors, because a fifth of the tests'
-time is waiting: for emulated stages, cameras and browsers.
+made once and not by every worker. With `-n auto`, there is one worker more than processors, because a fifth of the time
+of the tests is waiting: for emulated stages, cameras and browsers.
 """
 
 import os
