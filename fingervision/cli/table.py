@@ -1,5 +1,6 @@
 """`fingervision table`: show how a table of another program is interpreted; save the interpretation."""
 
+import pkgutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,10 @@ if TYPE_CHECKING:
     from fingervision.tables.account import Account
     from fingervision.tables.mapping import Entry
 
-EXAMPLES = """
+# Their names alone: the formats themselves import libraries that take a second.
+FORMATS = sorted(each.name for each in pkgutil.iter_modules([str(Path(__file__).parents[1] / "tables" / "formats")]))
+
+EXAMPLES = f"""
 \b
 Examples:
   fingervision table stage.lvm
@@ -22,7 +26,7 @@ Examples:
   fingervision table stage.lvm --figure stage.png
 
 \b
-Formats: text of any convention (CSV, COMSOL, LabVIEW .lvm), .xlsx, .mat, .parquet and .tdms.
+Formats: {", ".join(name for name in FORMATS if name[0] != "_")} (text: any convention, such as CSV and COMSOL).
 
 \b
 Keys of --set and of columns.toml:
