@@ -67,7 +67,6 @@ def test_a_wedge_that_is_not_in_the_region_is_refused() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_the_shape_of_edges_tells_the_exponent_within_its_uncertainty() -> None:
     away = []
     for seed in range(10):

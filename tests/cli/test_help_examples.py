@@ -91,9 +91,8 @@ def test_every_example_can_be_parsed(name: str, monkeypatch: pytest.MonkeyPatch,
         command.make_context(command.name, words)
 
 
-# Minutes in all: CI runs the examples of the manual and of the README, and every example is parsed in any case.
+# Minutes in all; a plain run has the examples of the manual and of the README, and every example is parsed in any case.
 @pytest.mark.slow
-@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name, examples in ALL.items() if examples])
 def test_every_example_runs_in_its_folder(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     case = name.partition(" ")[0]

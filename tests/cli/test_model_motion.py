@@ -125,7 +125,6 @@ def test_modes_up_to_a_frequency_and_their_film(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_a_mechanism_moves_too(tmp_path: Path) -> None:
     given = tmp_path / "drive.csv"
     given.write_text("time_s,input_mm\n" + "".join(f"{0.05 * i},{0.1 * i / 4:.4f}\n" for i in range(5)))

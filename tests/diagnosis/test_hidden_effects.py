@@ -111,8 +111,7 @@ def test_a_play_that_stays_engaged_belongs_to_the_set_of_an_offset() -> None:
 
 # Two kinds of table are tested only in the benchmark: poor runs, because the set of explanations depends on the noise,
 # and most effects outside the catalogue, because their many imitations take a minute per table.
-QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outside", 1),
-             pytest.param("pair_3", 1, marks=pytest.mark.long)]  # fmt: skip
+QUESTIONS = [("null", 1), ("null", 2), ("single_3", 1), ("single_3", 2), ("outside", 1), ("pair_3", 1)]
 
 
 @pytest.mark.slow

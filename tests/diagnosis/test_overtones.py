@@ -69,7 +69,6 @@ def test_an_error_with_many_harmonics_is_one_cyclic_error(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_a_large_harmonic_is_told(tmp_path: Path) -> None:
     report = screwed(tmp_path, 0.6)
     assert report.verdict is Verdict.UNKNOWN

@@ -59,7 +59,7 @@ def answered(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("straight", [False, True])
-@pytest.mark.parametrize("late_s", [0.03, pytest.param(0.06, marks=pytest.mark.long)])
+@pytest.mark.parametrize("late_s", [0.03, 0.06])
 def test_a_delay_is_told_from_a_resonance_however_the_stage_went_between_two_samples(
     tmp_path: Path, late_s: float, straight: bool
 ) -> None:
@@ -68,7 +68,6 @@ def test_a_delay_is_told_from_a_resonance_however_the_stage_went_between_two_sam
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_a_model_with_the_delay_disagrees_nowhere(tmp_path: Path) -> None:
     answered(tmp_path, late_s=0.03)
     model = read_model(tmp_path / "sim.csv")

@@ -116,7 +116,6 @@ def test_contact_is_named(diagnosed: Diagnosed) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_a_barrel_lens_is_named(diagnosed: Diagnosed) -> None:
     report = diagnosed(Film(camera=replace(PLAIN, lens=RadialLens(k1=K1))))
     assert (report["verdict"], report["alternatives"]) == ("named", [["lens_distortion"]])

@@ -37,7 +37,6 @@ def on_every_screen(firefox: Firefox, address: str, name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_live_a_run_folder_and_a_recording_in_firefox(firefox: Firefox, live: Callable[..., Any]) -> None:
     view = live("simulated", "--port", "0")
     on_every_screen(firefox, view.address, "live")

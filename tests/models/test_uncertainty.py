@@ -94,7 +94,6 @@ def test_linear_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -
 
 
 @pytest.mark.slow
-@pytest.mark.long
 def test_sampled_propagation_against_monte_carlo_of_the_frame(gripper: Gripper) -> None:
     """A printed hinge of 1.0 +- 0.1 mm: the compliance is proportional to t^-2.5, far from linear."""
     u = MappingProxyType({"hinge.thickness_mm": 0.1})
