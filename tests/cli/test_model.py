@@ -107,7 +107,7 @@ def test_a_file_where_the_folder_should_be(tmp_path: Path) -> None:
 
 
 def test_a_missing_gripper_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(InputFileError, match="There is no gripper"):
+    with pytest.raises(InputFileError, match="There is no drawing"):
         run(tmp_path / "none.toml")
 
 

@@ -79,7 +79,7 @@ def test_missing_parts_are_named() -> None:
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(InputFileError, match="There is no gripper"):
+    with pytest.raises(InputFileError, match="There is no drawing"):
         read_gripper(tmp_path / "none.toml")
     (tmp_path / "bad.toml").write_text("[hinge")
     with pytest.raises(DataError, match="must be TOML, but is not"):

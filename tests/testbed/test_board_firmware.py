@@ -13,6 +13,7 @@ from fingervision.testbed.board.board import Board, opened
 from fingervision.testbed.board.link import ASK_EVERY_S
 from fingervision.testbed.board.wire import Levels
 from tests.testbed.emulated_board import HERTZ, WIRING, Edge, EmulatedBoard, MotorController
+from tests.waiting import until
 
 SELECT_PINS = [WIRING[role].pin for role in SELECT]
 DRIVE_PIN, ENABLE_PIN, HOLD_PIN = WIRING[Role.DRIVE].pin, WIRING[Role.ENABLE].pin, WIRING[Role.HOLD].pin
@@ -166,12 +167,11 @@ def test_a_slow_motion_may_take_minutes(emulated: EmulatedBoard, board: Board) -
 
 def test_force_is_sampled_at_its_rate_without_loss_and_converted_rightly(emulated: EmulatedBoard, board: Board) -> None:
     emulated.say("adc 0 1234")
-    emulated.clock.wait_until(emulated.clock.now_s() + 0.2)
-    board.samples()
+    # 1234 mV of 5000 mV, in 1024 steps.
+    until(lambda: any(sample.level == 252 for sample in board.samples()))
     emulated.clock.wait_until(emulated.clock.now_s() + 1.0)
     samples = board.samples()
     assert board.lost_samples == 0
-    # 1234 mV of 5000 mV, in 1024 steps.
     assert {sample.level for sample in samples} == {252}
     steps_s = [b.board_s - a.board_s for a, b in pairwise(samples)]
     assert all(step_s == pytest.approx(5e-3, abs=INTERRUPT_S) for step_s in steps_s)
