@@ -1,6 +1,6 @@
-"""The test bed: actuator, force sensor, camera and clock of one experiment, and its operator."""
+"""The test bed: actuator, force sensor, camera and clock of one experiment, and requests to its operator."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,7 +9,7 @@ from fingervision.domain.model import Model
 from fingervision.measuring.scale import Scale
 from fingervision.testbed.actuator import Actuator
 from fingervision.testbed.camera import BedCamera
-from fingervision.testbed.cameras.simulated import SHIFT_MM, SimulatedCamera
+from fingervision.testbed.cameras.simulated import SHIFT_MM, Placed, SimulatedCamera
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import ForceSensor
 from fingervision.testbed.motion.move_limits import SoftLimits
@@ -17,67 +17,30 @@ from fingervision.testbed.terminal import TERMINAL
 from fingervision.testbed.text_protocol.sensor import TextSensor
 
 
-class Operator:
-    """The operator of a test bed: a person who receives requests on the terminal, and confirms when a step is done."""
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What an operator is asked to do: in words, and as the change of a simulated part's placement."""
 
-    def turn_part(self) -> None:
-        """Ask the person on the terminal to turn the part, and wait for the confirmation."""
-        self._ask("Turn the part by 180 degrees in the picture.")
-
-    def shift_picture(self) -> None:
-        """Ask the person on the terminal to shift the picture, and wait for the confirmation."""
-        self._ask("Shift the camera, so that the fingers appear at another place in the picture.")
-
-    def put_in_slot(self, size_mm: float) -> None:
-        """Ask the person on the terminal to insert the reference slot, and wait for the confirmation."""
-        self._ask(f"Put the reference slot of {size_mm:g} mm in the plane of the fingers, in front of the camera.")
-
-    def take_out_slot(self) -> None:
-        """Ask the person on the terminal to remove the reference slot, and wait for the confirmation."""
-        self._ask("Take the reference slot away, so that the camera sees the fingers again.")
-
-    def _ask(self, words: str) -> None:
-        if TERMINAL.ask(f"{words} Press Enter when it is done: ") is None:
-            raise StateError(
-                f"The recipe asks the operator ({words.rstrip('.').lower()}), but there is no terminal: run the "
-                "command from a terminal."
-            )
+    words: str
+    change: Callable[[Placed], Placed]
 
 
-class AtTheSimulation(Operator):
-    """Operator of a simulated test bed: the placement of the simulated part changes at once.
-
-    Parameters
-    ----------
-    camera : SimulatedCamera
-        The camera in front of which the part is placed.
-    """
-
-    def __init__(self, camera: SimulatedCamera) -> None:
-        self._camera = camera
-
-    def turn_part(self) -> None:
-        """Turn the simulated part."""
-        placed = self._camera.placed
-        self._camera.place(replace(placed, turned=not placed.turned))
-
-    def shift_picture(self) -> None:
-        """Shift the simulated part, and shift it back at the next call."""
-        placed = self._camera.placed
-        self._camera.place(replace(placed, shift_mm=SHIFT_MM - placed.shift_mm))
-
-    def put_in_slot(self, size_mm: float) -> None:
-        """Render a slot in place of the fingers."""
-        self._camera.place(replace(self._camera.placed, slot_mm=size_mm))
-
-    def take_out_slot(self) -> None:
-        """Render the fingers again."""
-        self._camera.place(replace(self._camera.placed, slot_mm=None))
+TURN = Request("Turn the part by 180 degrees in the picture.", lambda placed: replace(placed, turned=not placed.turned))
+# The second shift brings the picture back.
+SHIFT = Request(
+    "Shift the camera, so that the fingers appear at another place in the picture.",
+    lambda placed: replace(placed, shift_mm=SHIFT_MM - placed.shift_mm),
+)
+TAKE_OUT_SLOT = Request(
+    "Take the reference slot away, so that the camera sees the fingers again.",
+    lambda placed: replace(placed, slot_mm=None),
+)
 
 
-def operator_of(camera: BedCamera | None) -> Operator:
-    """Choose the operator of a test bed according to its camera."""
-    return AtTheSimulation(camera) if isinstance(camera, SimulatedCamera) else Operator()
+def put_in_slot(size_mm: float) -> Request:
+    """Request to put a reference slot in place of the fingers."""
+    words = f"Put the reference slot of {size_mm:g} mm in the plane of the fingers, in front of the camera."
+    return Request(words, lambda placed: replace(placed, slot_mm=size_mm))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,8 +55,6 @@ class Bed:
         Actuator of the drive point.
     limits : SoftLimits
         Limits for all requested motions.
-    operator : Operator
-        Performs manual actions: turns the part, shifts the picture, inserts a slot.
     force_sensor : ForceSensor or None
         Sensor of the force at the drive.
     camera : BedCamera or None
@@ -115,7 +76,6 @@ class Bed:
     clock: Clock
     actuator: Actuator
     limits: SoftLimits
-    operator: Operator
     force_sensor: ForceSensor | None = None
     camera: BedCamera | None = None
     scale: Scale | None = None
@@ -124,6 +84,16 @@ class Bed:
     replays: bool = False
     about: Mapping[str, Any] = field(default_factory=dict)
     channels: Mapping[str, TextSensor] = field(default_factory=dict)
+
+    def operate(self, request: Request) -> None:
+        """Let the operator do something: a person on the terminal, or the simulation, which does it at once."""
+        if self.replays and isinstance(self.camera, SimulatedCamera):
+            self.camera.place(request.change(self.camera.placed))
+        elif TERMINAL.ask(f"{request.words} Press Enter when it is done: ") is None:
+            raise StateError(
+                f"The recipe asks the operator ({request.words.rstrip('.').lower()}), but there is no terminal: run "
+                "the command from a terminal."
+            )
 
     def check(self, force_n: float | None, limit_n: float, where: str = "") -> None:
         """Refuse to go on with an alarm of the actuator, or with a force (None: not measured) beyond a limit.

@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Collection
-from contextlib import suppress
+from contextlib import ExitStack, closing
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, cast
 
 from calib.calibration import BareScale
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import UsageError
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import Model
 from fingervision.measuring.scale import Scale
@@ -22,7 +22,7 @@ from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.toml_section import Section, read_section
 from fingervision.tables.read import read_simulation_table
 from fingervision.testbed.actuator import Actuator, StageLimits
-from fingervision.testbed.bed import Bed, Operator, operator_of
+from fingervision.testbed.bed import Bed
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.camera import BedCamera
 from fingervision.testbed.clocks.clock import Clock, HostClock, VirtualClock
@@ -99,39 +99,29 @@ def _built(
     *,
     replays: bool,
 ) -> Bed:
-    opened: list[Any] = []
-    try:
-        actuator: Actuator = parts["actuator"].build(sections["actuator"], context)
-        opened.append(actuator)
+    with ExitStack() as opened:
+
+        def build(part: str) -> Any:
+            return opened.enter_context(closing(parts[part].build(sections[part], context)))
+
+        actuator: Actuator = build("actuator")
         limits = limits_within(context.limits, actuator.limits, top.table("limits"))
         if model is not None:
             if context.motion is None:
                 followed = Followed(actuator)
                 actuator, context.motion = cast("Actuator", followed), followed.motion
             context.gripper = SimulatedGripper(model, context.motion, context.hidden, context.play_mm, context.since_s)
-        force: ForceSensor | None = None
-        if "force_sensor" in parts:
-            force = parts["force_sensor"].build(sections["force_sensor"], context)
-            opened.append(force)
-        camera: BedCamera | None = None
-        if "camera" in parts:
-            camera = parts["camera"].build(sections["camera"], context)
-            opened.append(camera)
+        force: ForceSensor | None = build("force_sensor") if "force_sensor" in parts else None
+        camera: BedCamera | None = build("camera") if "camera" in parts else None
         channels: dict[str, TextSensor] = {}
         for section in top.tables("channel"):
             name = channel_name(section, channels)
-            channels[name] = opened_sensor(section, context)
-            opened.append(channels[name])
-    except BaseException:
-        for part in opened:
-            with suppress(FingervisionError):
-                part.close()
-        raise
+            channels[name] = opened.enter_context(closing(opened_sensor(section, context)))
+        opened.pop_all()
     return Bed(
         clock=context.clock,
         actuator=actuator,
         limits=limits,
-        operator=operator_of(camera) if replays else Operator(),
         force_sensor=force,
         camera=camera,
         scale=context.scale,

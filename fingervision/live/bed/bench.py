@@ -24,7 +24,7 @@ from fingervision.storage.out_folder import make_out_folder
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
-from fingervision.testbed.manual.manual_control import Looking, home, jog, move
+from fingervision.testbed.manual.manual_control import home, jog, move
 from fingervision.testbed.run.controls import Controls
 from fingervision.testbed.run.recipe_run import run_recipe
 from fingervision.testbed.run.run_folder import SIMULATION, write_expected
@@ -144,19 +144,19 @@ class Bench:
 
     def home(self) -> None:
         """Move the stage to its reference position."""
-        self._ask(Task("homing", lambda: f"At the reference: {home(self.bed, self._looking()):z.4f} mm."))
+        self._ask(Task("homing", lambda: f"At the reference: {home(self.bed, self._looking):z.4f} mm."))
 
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Move the stage to a position within the limits."""
 
         def act() -> str:
-            return f"At {move(self.bed, to_mm, speed_mm_s, self._looking()):z.4f} mm."
+            return f"At {move(self.bed, to_mm, speed_mm_s, self._looking):z.4f} mm."
 
         self._ask(Task(f"moving to {to_mm:g} mm", act))
 
     def jog(self, speed_mm_s: float, for_s: float) -> None:
         """Move the stage at a signed speed for a given time, at most to the limit."""
-        self._ask(Task("jogging", lambda: f"At {jog(self.bed, speed_mm_s, for_s, looking=self._looking()):z.4f} mm."))
+        self._ask(Task("jogging", lambda: f"At {jog(self.bed, speed_mm_s, for_s, looking=self._looking):z.4f} mm."))
 
     def run(self, recipe: Recipe[Section], out: Path) -> None:
         """Run a recipe and write its results to a folder."""
@@ -204,8 +204,9 @@ class Bench:
         finally:
             self.doing, self.progress = "", None
 
-    def _looking(self) -> Looking:
-        return Looking(self._look, lambda: self.position_mm, lambda: self.force_n)
+    def _looking(self) -> tuple[float, float | None]:
+        self._look()
+        return self.position_mm, self.force_n
 
     def _look(self) -> None:
         """Acquire one frame, and keep it until the stage's position at its exposure can be interpolated."""

@@ -4,15 +4,16 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from math import copysign, inf, isfinite
+from functools import partial
+from math import copysign, inf
 from time import monotonic, sleep
 from types import FrameType
 
-from fingervision.domain.errors import DeviceError, FingervisionError, LimitError, StateError
+from fingervision.domain.errors import DeviceError, FingervisionError, StateError
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import SIMULATED, open_bed, read_configuration
 from fingervision.testbed.device_kinds import kind_of
+from fingervision.testbed.motion.move_limits import check_move
 from fingervision.testbed.terminal import handled
 
 LOOK_EVERY_S = 0.02
@@ -24,30 +25,16 @@ class Interrupted(BaseException):
     """Ctrl-C or a request to end; the motor was stopped before this exception was raised."""
 
 
-@dataclass(frozen=True, slots=True)
-class Looking:
-    """How a motion is monitored: by the test bed's instruments alone or, in the browser, by every frame as well.
-
-    Parameters
-    ----------
-    wait : callable
-        Waits for a short time of the test bed.
-    position_mm, force_n : callable
-        Return the latest readings; the force is None without a force sensor.
-    """
-
-    wait: Callable[[], None]
-    position_mm: Callable[[], float]
-    force_n: Callable[[], float | None]
+Looking = Callable[[], tuple[float, float | None]]
+"""How a motion is monitored: a call waits for a short time of the test bed, or in the browser for a frame, and returns
+the latest position (mm) and force (N; None without a force sensor)."""
 
 
-def by_instruments(bed: Bed) -> Looking:
+def by_instruments(bed: Bed) -> tuple[float, float | None]:
     """Monitor a motion by the test bed's own readings."""
-    return Looking(
-        lambda: bed.clock.wait_until(bed.clock.now_s() + LOOK_EVERY_S),
-        lambda: bed.actuator.readings()[-1].value,
-        lambda: None if bed.force_sensor is None else bed.force_sensor.readings()[-1].value,
-    )
+    bed.clock.wait_until(bed.clock.now_s() + LOOK_EVERY_S)
+    force = bed.force_sensor
+    return bed.actuator.readings()[-1].value, None if force is None else force.readings()[-1].value
 
 
 @contextmanager
@@ -75,24 +62,15 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = No
     DeviceError, LimitError, StateError
         The target or the speed is beyond a limit (nothing was moved), or the motion was interrupted.
     """
-    limits = bed.limits
-    if not isfinite(to_mm):
-        raise LimitError(f"The target must be a finite number of mm, but is {to_mm:g}: nothing was moved.")
-    if not limits.lower_mm <= to_mm <= limits.upper_mm:
-        beyond_mm = max(limits.lower_mm - to_mm, to_mm - limits.upper_mm)
-        raise LimitError(
-            f"The target must lie within the test bed's limits of {limits.lower_mm:g} to {limits.upper_mm:g} mm, but "
-            f"{to_mm:g} mm is {beyond_mm:.4g} mm beyond: nothing was moved."
-        )
-    _check_speed(bed, speed_mm_s)
+    check_move(bed.limits, to_mm, speed_mm_s)
     return _watched(bed, lambda: bed.actuator.move(to_mm, speed_mm_s), looking=looking)
 
 
 def jog(bed: Bed, speed_mm_s: float, for_s: float = inf, looking: Looking | None = None) -> float:
     """Move at a signed speed until stopped, for a time, or to a limit; return the position afterwards (mm)."""
-    _check_speed(bed, abs(speed_mm_s))
     end_mm = bed.limits.upper_mm if speed_mm_s > 0.0 else bed.limits.lower_mm
     # A stored step that has begun runs to its end unless it is stopped in time.
+    check_move(bed.limits, end_mm, abs(speed_mm_s))
     last_mm = end_mm - (WARNING_S * speed_mm_s if bed.actuator.has_steps else 0.0)
 
     def enough(at_mm: float) -> bool:
@@ -106,14 +84,6 @@ def run_step(bed: Bed, number: int) -> float:
     return _watched(bed, lambda: bed.actuator.run_step(number))
 
 
-def _check_speed(bed: Bed, speed_mm_s: float) -> None:
-    if not 0.0 < speed_mm_s <= bed.limits.speed_mm_s:
-        raise LimitError(
-            f"The speed must be positive and at most {bed.limits.speed_mm_s:g} mm/s, but is {speed_mm_s:g}: nothing "
-            "was moved."
-        )
-
-
 def _watched(
     bed: Bed,
     begin: Callable[[], None],
@@ -121,24 +91,25 @@ def _watched(
     enough: Callable[[float], bool] = lambda at_mm: False,
     looking: Looking | None = None,
 ) -> float:
-    looking = looking or by_instruments(bed)
+    looking = looking or partial(by_instruments, bed)
     began_s = bed.clock.now_s()
     try:
         with motor_stops_first(bed.actuator.stop):
             begin()
             while bed.actuator.busy:
-                bed.check(looking.force_n(), bed.limits.force_n)
-                if bed.clock.now_s() - began_s >= for_s or enough(looking.position_mm()):
+                at_mm, force_n = looking()
+                bed.check(force_n, bed.limits.force_n)
+                if bed.clock.now_s() - began_s >= for_s or enough(at_mm):
                     bed.actuator.stop()
-                looking.wait()
-            bed.check(looking.force_n(), bed.limits.force_n)
+            at_mm, force_n = looking()
+            bed.check(force_n, bed.limits.force_n)
     except Interrupted:
-        at_mm = looking.position_mm()
+        at_mm, _ = looking()
         raise StateError(f"Stopped: the motor has stopped near {at_mm:z.3f} mm.") from None
     except FingervisionError:
         bed.actuator.stop()
         raise
-    return looking.position_mm()
+    return at_mm
 
 
 # Stop a test bed, also if another process operates it.

@@ -13,7 +13,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import StageLimits
 
 
-def check_move(limits: StageLimits, to_mm: float, speed_mm_s: float) -> None:
+def check_move(limits: "StageLimits | SoftLimits", to_mm: float, speed_mm_s: float) -> None:
     """Refuse a target outside the stroke of the stage, and a speed that is not positive or too high.
 
     Raises
@@ -31,7 +31,7 @@ def check_move(limits: StageLimits, to_mm: float, speed_mm_s: float) -> None:
     check_speed(limits, speed_mm_s)
 
 
-def check_speed(limits: StageLimits, speed_mm_s: float) -> None:
+def check_speed(limits: "StageLimits | SoftLimits", speed_mm_s: float) -> None:
     """Refuse a speed that is negative or too high.
 
     Raises

@@ -13,7 +13,7 @@ from fingervision.domain.recipe import Recipe
 from fingervision.measuring.rehearsal import rehearse
 from fingervision.storage.drive_csv import SampleRow
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.bed import Bed
+from fingervision.testbed.bed import SHIFT, TURN, Bed
 from fingervision.testbed.manual import manual_control
 from fingervision.testbed.recipe_kinds import Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn
 from fingervision.testbed.run import step_executor
@@ -205,10 +205,10 @@ class Runner:
                 step_executor.rezero(watch)
                 self._new_run(number, turned=watch.record.turned, rezeroed=True)
             case Turn():
-                watch.bed.operator.turn_part()
+                watch.bed.operate(TURN)
                 self._new_run(number, turned=not watch.record.turned)
             case Shift():
-                watch.bed.operator.shift_picture()
+                watch.bed.operate(SHIFT)
                 self._new_run(number, turned=watch.record.turned)
 
     def _new_run(self, leg: int, *, turned: bool, rezeroed: bool = False) -> None:

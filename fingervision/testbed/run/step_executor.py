@@ -15,6 +15,7 @@ from fingervision.domain.numbers import with_uncertainty
 from fingervision.domain.status import Status
 from fingervision.measuring.scale import Scale
 from fingervision.storage.gaps_csv import GapRow
+from fingervision.testbed.bed import TAKE_OUT_SLOT, put_in_slot
 from fingervision.testbed.recipe_kinds import Act, Close, Frames, Go, Slot, Stand, Swing
 from fingervision.testbed.run.safety_monitor import Watch
 from fingervision.testbed.run.synchronised_acquisition import Look
@@ -142,11 +143,11 @@ def rezero(watch: Watch) -> None:
 
 def slot(watch: Watch, act: Slot) -> dict[str, float]:
     """Request a reference slot, measure it, and request its removal; return the result for run.json."""
-    operator, scale = watch.bed.operator, watch.bed.scale
-    operator.put_in_slot(act.size_mm)
+    bed, scale = watch.bed, watch.bed.scale
+    bed.operate(put_in_slot(act.size_mm))
     watch.look()
     items = [watch.look().shot.item() for _ in range(SLOT_FRAMES)]
-    operator.take_out_slot()
+    bed.operate(TAKE_OUT_SLOT)
     assert scale is not None  # noqa: S101 - a sight was made of it
     found = {
         "size_mm": act.size_mm,
