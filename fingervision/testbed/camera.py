@@ -1,5 +1,6 @@
 """Protocol of a test bed's camera: frames, each with the time of its exposure."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -28,6 +29,20 @@ class Shot(Protocol):
     def item(self) -> Frame | LostFrame:
         """Return the picture; a simulated picture is rendered by this call. Its `time_s` is `device_s`."""
         ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Taken:
+    """A `Shot` whose picture is made by a function, once it is wanted."""
+
+    index: int
+    device_s: float
+    arrived_s: float
+    picture: Callable[[], Frame | LostFrame]
+
+    def item(self) -> Frame | LostFrame:
+        """Return the picture."""
+        return self.picture()
 
 
 @dataclass(frozen=True, slots=True)

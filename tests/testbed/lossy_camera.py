@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from fingervision.testbed.camera import Shot
 from fingervision.testbed.cameras import simulated
 
 KEYS = simulated.KEYS
@@ -13,7 +14,7 @@ def build(section: Any, context: Any) -> simulated.SimulatedCamera:
     camera = simulated.build(section, context)
     take = camera.next
 
-    def third() -> simulated.SimulatedShot:
+    def third() -> Shot:
         take()
         take()
         return take()

@@ -21,10 +21,10 @@ def test_the_clock_is_joined_within_its_stated_uncertainty(seconds: float) -> No
     for stamp_s, seen_s in zip(camera_s.tolist(), true_s.tolist(), strict=True):
         clock.add(stamp_s, seen_s + LEAST_S + MEAN_MORE_S * rng.standard_exponential())
     joined = clock.joined()
-    assert joined.u_s >= U_LEAST_S
-    assert joined.u_s < JOINED_WITHIN_S
+    assert joined.u_at(joined.board_s) >= U_LEAST_S
+    assert joined.u_at(joined.board_s) < JOINED_WITHIN_S
     for stamp_s, seen_s in ((camera_s[-1], true_s[-1]), (camera_s[-25], true_s[-25])):
-        assert joined.bed_at(float(stamp_s)) == pytest.approx(seen_s, abs=2.0 * joined.u_s)
+        assert joined.host_at(float(stamp_s)) == pytest.approx(seen_s, abs=2.0 * joined.u_at(joined.board_s))
 
 
 def test_a_late_frame_changes_nothing() -> None:

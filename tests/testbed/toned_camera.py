@@ -16,8 +16,8 @@ def build(section: Any, context: Any) -> simulated.SimulatedCamera:
     camera = simulated.build(section, context)
     draw = camera.draw
 
-    def toned(shot: simulated.SimulatedShot) -> Any:
-        light = draw(shot) / 255.0
+    def toned(*exposure: Any) -> Any:
+        light = draw(*exposure) / 255.0
         curve = np.where(light <= GAMMA_BELOW, SLOPE * light, 1.055 * light ** (1.0 / GAMMA) - 0.055)
         return np.rint(255.0 * curve).astype(np.uint8)
 

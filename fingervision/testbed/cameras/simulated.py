@@ -14,7 +14,7 @@ from fingervision.rendering import EVEN_LIGHT, Camera, Patch, Scene, render, two
 from fingervision.rendering.targets import slot
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.build_context import BuildContext
-from fingervision.testbed.camera import Latency
+from fingervision.testbed.camera import Latency, Taken
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import SimulatedGripper
@@ -45,23 +45,6 @@ class Placed:
     turned: bool = False
     shift_mm: float = 0.0
     slot_mm: float | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SimulatedShot:
-    """A frame that is rendered when its picture is requested."""
-
-    index: int
-    exposure: int
-    device_s: float
-    arrived_s: float
-    exposed_s: float
-    placed: Placed
-    camera: "SimulatedCamera"
-
-    def item(self) -> Frame:
-        """Render the picture."""
-        return Frame(self.camera.draw(self), self.index, self.device_s)
 
 
 class SimulatedCamera:
@@ -111,7 +94,7 @@ class SimulatedCamera:
         self._exposure, self._index = int(np.ceil(self._own.shows_s(clock.now_s()) * rate_hz)), 0
         gripper.looked_at(self._own.bed_s(self._exposure / rate_hz), 1.0 / (rate_hz * self._own.rate))
 
-    def next(self) -> SimulatedShot:
+    def next(self) -> Taken:
         """Wait for the next frame and return it; earlier frames that were not requested are lost."""
         while True:
             device_s, exposed_s, arrived_s = self._times_s()
@@ -119,8 +102,9 @@ class SimulatedCamera:
             if arrived_s >= self._clock.now_s():
                 break
         self._clock.wait_until(arrived_s)
+        index, exposure, placed = self._index, self._exposure - 1, self.placed
         self._index += 1
-        return SimulatedShot(self._index - 1, self._exposure - 1, device_s, arrived_s, exposed_s, self.placed, self)
+        return Taken(index, device_s, arrived_s, lambda: Frame(self.draw(exposure, exposed_s, placed), index, device_s))
 
     def ready(self, within_s: float) -> bool:
         """Wait for the next frame, but no longer than a time; return whether it is there."""
@@ -143,14 +127,14 @@ class SimulatedCamera:
     def close(self) -> None:
         """Do nothing: there is no hardware to release."""
 
-    def draw(self, shot: SimulatedShot) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-        """Render the picture of a shot."""
-        optics, placed = self._optics, shot.placed
+    def draw(self, exposure: int, exposed_s: float, placed: Placed) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+        """Render the picture of an exposure, by its number, time on the test bed's clock, and placement of the part."""
+        optics = self._optics
         if placed.slot_mm is not None:
-            scene = self._slot(self._gripper.slot_at(placed.slot_mm, shot.exposed_s - optics.late_s))
+            scene = self._slot(self._gripper.slot_at(placed.slot_mm, exposed_s - optics.late_s))
         else:
-            scene = self._scene(shot.exposed_s - optics.late_s, placed)
-        rng = np.random.default_rng([self._seed, 5, abs(shot.exposure)])
+            scene = self._scene(exposed_s - optics.late_s, placed)
+        rng = np.random.default_rng([self._seed, 5, abs(exposure)])
         return np.asarray(render(scene, optics.camera, rng), dtype=np.uint8)
 
     def _slot(self, edges: Response) -> Scene:

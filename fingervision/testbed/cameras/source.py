@@ -1,16 +1,15 @@
 """Any live source of frames as the test bed's camera: a camera of this machine, or a network stream."""
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from threading import Condition, Thread
 from typing import cast
 
 from fingervision.domain.errors import DeviceError, FingervisionError
-from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.source import LiveSource, Received, Wish, open_source
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.build_context import BuildContext
-from fingervision.testbed.camera import Latency
+from fingervision.testbed.camera import Latency, Taken
 
 KEYS = ("source", "rate_hz", "width_px", "height_px", "patience_s", "latency_s", "u_latency_s")
 SIMULATED = False
@@ -21,20 +20,6 @@ PATIENCE_S = 1.0
 LATENCY_S, U_LATENCY_S = 0.04, 0.04
 # Largest number of waiting frames; older frames are dropped, because the test bed needs the present state.
 FRAMES_WAITING = 8
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SourceShot:
-    """A frame that was received."""
-
-    index: int
-    device_s: float
-    arrived_s: float
-    received: Frame | LostFrame
-
-    def item(self) -> Frame | LostFrame:
-        """Return the picture."""
-        return self.received
 
 
 class SourceCamera:
@@ -60,7 +45,7 @@ class SourceCamera:
         self.description = source.description
         Thread(target=self._read, name="bed camera", daemon=True).start()
 
-    def next(self) -> SourceShot:
+    def next(self) -> Taken:
         """Wait for the next frame of the source and return it."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._ended, self._patience_s)
@@ -74,7 +59,8 @@ class SourceCamera:
         index, self._index = self._index, self._index + 1
         own_s = received.item.time_s if self._source.has_own_clock else None
         device_s = received.arrived_s if own_s is None else own_s
-        return SourceShot(index, device_s, received.arrived_s, replace(received.item, index=index, time_s=device_s))
+        item = replace(received.item, index=index, time_s=device_s)
+        return Taken(index, device_s, received.arrived_s, lambda: item)
 
     def ready(self, within_s: float) -> bool:
         """Wait for the next frame, but no longer than a time; return whether `next` need not wait for it."""

@@ -106,20 +106,20 @@ UNKNOWN_RATE = 0.008
 
 @dataclass(frozen=True, slots=True)
 class JoinedClock:
-    """The computer's time as a linear function of the board's time, valid near the exchanges to which it was fitted.
+    """The computer's time as a linear function of a board's or a camera's time, valid near what it was fitted to.
 
     Parameters
     ----------
     board_s : float
-        Time of the board in the middle of the exchanges.
+        Time of the board in the middle of the exchanges, or of the camera.
     host_s : float
         Time of the computer at that instant.
     rate : float
         Seconds of the computer per second of the board.
     within_s : float
-        Bound of the error of `host_s`.
+        Bound of the error of `host_s`; a uniform distribution within it has its standard uncertainty.
     u_rate : float
-        Standard uncertainty of the rate.
+        Standard uncertainty of the rate; 0 for a camera, whose frames are near.
     """
 
     board_s: float
@@ -189,30 +189,6 @@ NEWEST_BINS, MOST_BINS = 10, 600
 FIRST_SCATTER_S = 1e-3
 
 
-@dataclass(frozen=True, slots=True)
-class CameraClock:
-    """The test bed's time as a linear function of the camera's time.
-
-    Parameters
-    ----------
-    camera_s, bed_s : float
-        Times of one instant on the two clocks.
-    rate : float
-        Seconds of the test bed's clock per second of the camera's.
-    u_s : float
-        Standard uncertainty near that instant, from the smallest latency and the scatter of the earliest arrivals.
-    """
-
-    camera_s: float
-    bed_s: float
-    rate: float
-    u_s: float
-
-    def bed_at(self, camera_s: float) -> float:
-        """Time on the bed's clock at a time stamp of the camera (s)."""
-        return self.bed_s + self.rate * (camera_s - self.camera_s)
-
-
 class ArrivalClock:
     """Collects arrival times and fits the clock to the earliest.
 
@@ -235,8 +211,8 @@ class ArrivalClock:
         elif delay_s < self._bins[-1][2]:
             self._bins[-1] = (self._bins[-1][0], camera_s, delay_s)
 
-    def joined(self) -> CameraClock:
-        """Fit the clock to all arrivals until now."""
+    def joined(self) -> JoinedClock:
+        """Fit the clock to all arrivals until now, by the smallest latency and the scatter of the earliest."""
         _, at_s, delay_s = np.array(self._bins).T
         about_s = float(at_s[-1])
         since_s = at_s - at_s.mean()
@@ -245,4 +221,5 @@ class ArrivalClock:
         # Ridge regression: the rate stays small where the arrivals determine it less well than the data sheets.
         rate = float(since_s @ delay_s) / float(since_s @ since_s + (scatter_s / LIKELY_RATE) ** 2 + 1e-12)
         level_s = (delay_s - rate * (at_s - about_s))[-NEWEST_BINS:]
-        return CameraClock(about_s, about_s + float(level_s.min()), 1.0 + rate, hypot(self._latency.u_s, scatter_s))
+        within_s = sqrt(3.0) * hypot(self._latency.u_s, scatter_s)
+        return JoinedClock(about_s, about_s + float(level_s.min()), 1.0 + rate, within_s, 0.0)

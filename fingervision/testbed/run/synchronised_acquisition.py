@@ -1,7 +1,7 @@
 """Stage position and force at the time of each camera frame."""
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -39,19 +39,23 @@ class JoinedInstrument:
     ----------
     source : Actuator or ForceSensor
         Source of the readings.
+    note : callable
+        Stores a reading.
     """
 
-    def __init__(self, source: Actuator | ForceSensor) -> None:
-        self._source = source
+    def __init__(self, source: Actuator | ForceSensor, note: Callable[[Reading], None]) -> None:
+        self._source, self._note = source, note
         self.clock = ClockJoin()
         self.newest = 0.0
 
     def read(self) -> tuple[Reading, ...]:
-        """Return the readings since the last call, and synchronise the clocks with them."""
+        """Store and return the readings since the last call, and synchronise the clocks with them."""
         readings = self._source.readings()
         asked = readings[-1]
         self.clock.add(asked.device_s, asked.asked_s, asked.got_s)
         self.newest = asked.value
+        for reading in readings:
+            self._note(reading)
         return readings
 
     def device_at(self, bed_s: float) -> float:
@@ -64,15 +68,8 @@ class Position(JoinedInstrument):
     """Position of the stage over time, interpolated between the steps of its encoder."""
 
     def __init__(self, actuator: Actuator) -> None:
-        super().__init__(actuator)
         self._track = StageTrack(actuator.limits.encoder_step_mm)
-
-    def read(self) -> tuple[Reading, ...]:
-        """Return the readings since the last call, and use them for the interpolation."""
-        readings = super().read()
-        for reading in readings:
-            self._track.add(reading)
-        return readings
+        super().__init__(actuator, self._track.add)
 
     def at(self, bed_s: float, *, at_once: bool = False) -> float | None:
         """Position (mm) at a time of the test bed; None until later readings determine it (see `StageTrack`)."""
@@ -83,33 +80,24 @@ class History:
     """The newest readings of a quantity, between which it is interpolated linearly."""
 
     def __init__(self) -> None:
-        self._at_s: deque[float] = deque(maxlen=READINGS_KEPT)
-        self._value: deque[float] = deque(maxlen=READINGS_KEPT)
+        self._readings: deque[tuple[float, float]] = deque(maxlen=READINGS_KEPT)
 
-    def add(self, readings: Iterable[Reading]) -> None:
-        """Store readings; those that are no newer than the last one are left out."""
-        for reading in readings:
-            if not self._at_s or reading.device_s > self._at_s[-1]:
-                self._at_s.append(reading.device_s)
-                self._value.append(reading.value)
+    def add(self, reading: Reading) -> None:
+        """Store a reading; one that is no newer than the last one is left out."""
+        if not self._readings or reading.device_s > self._readings[-1][0]:
+            self._readings.append((reading.device_s, reading.value))
 
     def at(self, device_s: float) -> float | None:
         """Value at a time of the instrument's clock, held after the newest reading; None before the first reading."""
-        return float(np.interp(device_s, self._at_s, self._value)) if self._at_s else None
+        return float(np.interp(device_s, *np.array(self._readings).T)) if self._readings else None
 
 
 class Force(JoinedInstrument):
     """Force at the drive over time."""
 
     def __init__(self, sensor: ForceSensor) -> None:
-        super().__init__(sensor)
         self._history = History()
-
-    def read(self) -> tuple[Reading, ...]:
-        """Return the readings since the last call, and store them."""
-        readings = super().read()
-        self._history.add(readings)
-        return readings
+        super().__init__(sensor, self._history.add)
 
     def at(self, bed_s: float) -> float | None:
         """Force at a time of the test bed, interpolated linearly between readings (N)."""
@@ -124,7 +112,8 @@ class Channel:
 
     def at(self, bed_s: float) -> float | None:
         """Value at a time, linear between readings and held after the newest; None before the first reading."""
-        self._history.add(self._source.samples())
+        for reading in self._source.samples():
+            self._history.add(reading)
         return self._history.at(bed_s)
 
 
@@ -208,7 +197,7 @@ class Sight:
         self.position.read()
         if self.force is not None:
             self.force.read()
-        exposed_s = self.camera_clock.joined().bed_at(shot.device_s)
+        exposed_s = self.camera_clock.joined().host_at(shot.device_s)
         force_n = None if self.force is None else self.force.at(exposed_s)
         force_now_n = None if self.force is None else self.force.newest
         channels = {name: channel.at(exposed_s) for name, channel in self.channels.items()}
@@ -216,14 +205,14 @@ class Sight:
 
     def clocks(self) -> dict[str, dict[str, float]]:
         """Relation of each instrument's clock to the test bed's, for run.json."""
-        camera = self.camera_clock.joined()
-        clocks = {"camera": {"offset_s": camera.bed_s - camera.camera_s, "rate": camera.rate, "u_s": camera.u_s}}
-        for name, instrument in (("actuator", self.position), ("force_sensor", self.force)):
-            joined = None if instrument is None else instrument.clock.joined()
-            if joined is not None:
-                u_s = joined.u_at(joined.board_s)
-                clocks[name] = {"offset_s": joined.host_s - joined.board_s, "rate": joined.rate, "u_s": u_s}
-        return clocks
+        joined = {"camera": self.camera_clock.joined(), "actuator": self.position.clock.joined()}
+        if self.force is not None:
+            joined["force_sensor"] = self.force.clock.joined()
+        return {
+            name: {"offset_s": one.host_s - one.board_s, "rate": one.rate, "u_s": one.u_at(one.board_s)}
+            for name, one in joined.items()
+            if one is not None
+        }
 
     def know(self, camera: CameraModel | None) -> None:
         """Measure the following pictures by a camera that was learnt; None changes nothing."""

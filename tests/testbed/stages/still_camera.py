@@ -13,8 +13,8 @@ def build(section: Any, context: Any) -> simulated.SimulatedCamera:
     camera = simulated.build(section, context)
     draw, drawn = camera.draw, []
 
-    def once(shot: simulated.SimulatedShot) -> Any:
-        drawn[:] = drawn or [draw(shot)]
+    def once(*exposure: Any) -> Any:
+        drawn[:] = drawn or [draw(*exposure)]
         return drawn[0]
 
     camera.draw = once  # type: ignore[method-assign]
