@@ -111,7 +111,7 @@ def test_a_silent_computer_loses_the_drive_line_within_a_tenth_of_a_second(
     strict_board.run(3, 10.0)
     wait_for(emulated, strict_board, Levels.DRIVE)
     sent_s: list[float] = []
-    link = strict_board._link
+    link = strict_board
     send = link._send
 
     def muted(line: bytes) -> None:
@@ -140,7 +140,7 @@ def test_a_silent_computer_loses_the_standing_motor_too_but_later(
     """
     emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 1)
     since, before_s = len(emulated.edges), emulated.clock.now_s()
-    monkeypatch.setattr(strict_board._link, "_send", lambda line: None)
+    monkeypatch.setattr(strict_board, "_send", lambda line: None)
     after_s = emulated.clock.now_s()
     down = emulated.wait_for(lambda edge: edge.level(ENABLE_PIN) == 0, since=since)
     # The last message was sent up to one polling period before sending was blocked, or during the blocking.

@@ -1,7 +1,6 @@
 """Actuator connected to the parallel input lines of a motor controller, which executes its stored step data."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from fingervision.domain.errors import DeviceError, LimitError, StateError
@@ -29,7 +28,6 @@ READ_EVERY_S = 0.005
 CLOSES_WITHIN_S = 1.0
 
 
-@dataclass(frozen=True, slots=True)
 class Routes:
     """Motions that the step data allow, computed without opening the board.
 
@@ -41,9 +39,10 @@ class Routes:
         Limits of the stage.
     """
 
-    data: StepData
-    limits: StageLimits
-    has_steps: bool = True
+    has_steps = True
+
+    def __init__(self, data: StepData, limits: StageLimits) -> None:
+        self.data, self.limits = data, limits
 
     def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
         """Refuse targets beyond the limits, and targets that no sequence of steps reaches."""
@@ -51,7 +50,7 @@ class Routes:
         route(self.data.steps, from_mm, to_mm, speed_mm_s, self.limits.speed_mm_s)
 
 
-class BoardActuator:
+class BoardActuator(Routes):
     """The stage driven by the motor controller that is connected to the board.
 
     Parallel lines report no position; the position is computed from the profiles of the executed steps, within the
@@ -71,11 +70,9 @@ class BoardActuator:
         Clock of the test bed.
     """
 
-    has_steps = True
-
     def __init__(self, board: Board, data: StepData, limits: StageLimits, controller: Controller, clock: Clock) -> None:
-        self.limits = limits
-        self._board, self._data, self._controller, self._clock = board, data, controller, clock
+        super().__init__(data, limits)
+        self._board, self._controller, self._clock = board, controller, clock
         self._motions = Motions(board, controller, clock, data.start_mm)
         self._read_s = clock.now_s()
         self._closed = False
@@ -114,7 +111,7 @@ class BoardActuator:
         if self._controller.home_code is not None:
             self._motions.begin([Run(self._controller.home_code, self._controller.home_within_s, None)])
             return
-        for number, step in self._data.steps.items():
+        for number, step in self.data.steps.items():
             if step.coordinates is Coordinates.ABSOLUTE and step.target_mm == 0.0:
                 self._motions.begin([self._run_of(number, self._at_mm())])
                 return
@@ -123,16 +120,12 @@ class BoardActuator:
             "them: add one."
         )
 
-    def check(self, from_mm: float, to_mm: float, speed_mm_s: float) -> None:
-        """Refuse targets beyond the limits, and targets that no sequence of steps reaches."""
-        Routes(self._data, self.limits).check(from_mm, to_mm, speed_mm_s)
-
     def move(self, to_mm: float, speed_mm_s: float) -> None:
         """Begin to move, by the sequence of steps that leads to the target."""
         check_move(self.limits, to_mm, speed_mm_s)
         self._ready()
         at_mm = self._at_mm() if self._motions.known else None
-        self._begin_steps(route(self._data.steps, at_mm, to_mm, speed_mm_s, self.limits.speed_mm_s))
+        self._begin_steps(route(self.data.steps, at_mm, to_mm, speed_mm_s, self.limits.speed_mm_s))
 
     def jog(self, speed_mm_s: float) -> None:
         """Begin to move by a repeated relative step, until stopped or until a limit is reached."""
@@ -140,16 +133,16 @@ class BoardActuator:
         self._ready()
         if speed_mm_s == 0.0:
             return
-        number = jog_step(self._data.steps, speed_mm_s, self.limits.speed_mm_s)
+        number = jog_step(self.data.steps, speed_mm_s, self.limits.speed_mm_s)
         self._check_known(number)
         end_mm = self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm
-        count = int((end_mm - self._at_mm()) / self._data.steps[number].target_mm + 1e-9)
+        count = int((end_mm - self._at_mm()) / self.data.steps[number].target_mm + 1e-9)
         self._begin_steps((number,) * count)
 
     def run_step(self, number: int) -> None:
         """Begin one of the step data blocks."""
-        if number not in self._data.steps:
-            there = ", ".join(str(each) for each in self._data.steps)
+        if number not in self.data.steps:
+            there = ", ".join(str(each) for each in self.data.steps)
             raise LimitError(f"The step must be stored in the controller (stored steps: {there}), but is {number}.")
         self._ready()
         self._check_known(number)
@@ -193,7 +186,7 @@ class BoardActuator:
             )
 
     def _check_known(self, number: int) -> None:
-        if not self._motions.known and self._data.steps[number].coordinates is Coordinates.RELATIVE:
+        if not self._motions.known and self.data.steps[number].coordinates is Coordinates.RELATIVE:
             raise StateError(
                 f"The stage's position must be known before the relative step {number}, but is unknown since the start "
                 "or the last stop: home the stage first (--home-first)."
@@ -215,7 +208,7 @@ class BoardActuator:
         self._motions.begin(runs)
 
     def _run_of(self, number: int, at_mm: float) -> Run:
-        motion = planned(number, self._data.steps[number], at_mm, self.limits)
+        motion = planned(number, self.data.steps[number], at_mm, self.limits)
         # From an unknown position, the motion may take as long as homing.
         at_most_s = (
             PATIENCE * motion.motion.seconds

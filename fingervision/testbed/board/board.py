@@ -7,6 +7,8 @@ from math import ceil
 from threading import Lock
 from typing import NoReturn
 
+import serial
+
 from fingervision.domain.board_settings import BoardSettings, Role
 from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.storage.board_toml import read_board
@@ -37,17 +39,17 @@ class ForceSample:
     level: int
 
 
-class Board:
+class Board(BoardLink):
     """A board, opened by `opened`. Several parts of a test bed may use the same board.
 
     Parameters
     ----------
     settings : BoardSettings
         Wiring of the board.
-    link : BoardLink
-        Connection to the board.
-    identity : wire.Identity
-        Identity that the board reports.
+    port : serial.Serial
+        The open port.
+    clock : Clock
+        Clock of the computer.
 
     Attributes
     ----------
@@ -59,11 +61,10 @@ class Board:
         Number of force samples that did not arrive.
     """
 
-    def __init__(self, settings: BoardSettings, link: BoardLink, identity: wire.Identity) -> None:
+    def __init__(self, settings: BoardSettings, port: serial.Serial, clock: Clock) -> None:
         self.settings = settings
-        self.name = f"{identity.name} {identity.version} on {settings.port}"
+        self.name = f"{wire.NAME} on {settings.port}"
         self.lost_samples = 0
-        self._link = link
         self._levels, self.dropped_code = wire.Levels(0), wire.GOING
         self._users = 0
         self.driven_board_s: float | None = None
@@ -71,11 +72,12 @@ class Board:
         self._numbers = wire.Unwrapped(16)
         self._next_number: int | None = None
         self._guard = Lock()
+        super().__init__(port, clock)  # from now on, messages come
 
     @property
     def levels(self) -> wire.Levels:
         """Active output lines of the board, as last reported."""
-        self._link.check()
+        self.check()
         return self._levels
 
     @property
@@ -87,14 +89,8 @@ class Board:
     @property
     def clock(self) -> JoinedClock:
         """Relation of the board's clock to the computer's clock."""
-        joined = self._link.joined
-        assert joined is not None  # noqa: S101 - a board is opened only with its clock joined
-        return joined
-
-    @property
-    def damaged_lines(self) -> int:
-        """Number of lines received with a wrong checksum."""
-        return self._link.damaged_lines
+        assert self.joined is not None  # noqa: S101 - a board is opened only with its clock joined
+        return self.joined
 
     def run(self, code: int, at_most_s: float) -> None:
         """Set the select lines, wait until they have settled, and raise the drive line.
@@ -108,21 +104,10 @@ class Board:
         """Lower the drive line."""
         self._do("X")
 
-    def stop(self) -> None:
-        """Release drive and enable line and raise the hold line within milliseconds; motions are refused until `clear`.
-
-        The call does not wait for the board, and is allowed in a signal handler.
-        """
-        self._link.stop()
-
     def wait_for_stop(self) -> None:
-        """Wait until a requested stop has been executed."""
-        while self._link.stopping:
+        """Wait until a requested stop has been executed: drive and enable line released, hold line raised."""
+        while self.stopping:
             self.wait(ASK_EVERY_S)
-
-    def check(self) -> None:
-        """Raise an error if the board is lost."""
-        self._link.check()
 
     @property
     def ready(self) -> bool:
@@ -137,18 +122,13 @@ class Board:
         if Role.ENABLE in self.settings.lines:
             self._do("E 1")
 
-    def wait(self, seconds: float) -> None:
-        """Wait until a message has come from the board, at most for the given number of seconds."""
-        self._link.wait(seconds)
-        self._link.check()
-
     def samples(self) -> tuple[ForceSample, ...]:
         """Force samples since the last call."""
         with self._guard:
             taken = tuple(self._samples)
             self._samples.clear()
         if not taken:
-            self._link.check()
+            self.check()
         return taken
 
     def hold(self) -> "Board":
@@ -162,34 +142,68 @@ class Board:
         if self._users != 0:
             return
         try:
-            self._link.command("U")
+            self.command("U")
         except FingervisionError:
             return  # the board is disconnected; its watchdog has switched off the lines
         finally:
-            self._link.close()
+            self.disconnect()
 
-    def on_state(self, answer: wire.Answer) -> None:
-        """Receive the board's state (called by the link)."""
-        self._levels, self.dropped_code = answer.levels, answer.cause
+    def on_message(self, message: wire.Answer | wire.Change | wire.Sample, board_s: float) -> None:
+        """Note the state, changed lines, or a force sample."""
+        match message:
+            case wire.Answer():
+                self._levels, self.dropped_code = message.levels, message.cause
+            case wire.Change():
+                if message.levels & ~self._levels & wire.Levels.DRIVE:
+                    self.driven_board_s = board_s
+                self._levels = message.levels
+            case wire.Sample():
+                number = self._numbers.of(message.number)
+                if self._next_number is not None:
+                    self.lost_samples += max(number - self._next_number, 0)
+                self._next_number = number + 1
+                with self._guard:
+                    self._samples.append(ForceSample(board_s, message.level))
 
-    def on_change(self, change: wire.Change, board_s: float) -> None:
-        """Receive changed lines (called by the link)."""
-        if change.levels & ~self._levels & wire.Levels.DRIVE:
-            self.driven_board_s = board_s
-        self._levels = change.levels
+    def set_up(self) -> None:
+        """Check the board's identity, state its wiring and watchdog, and wait until its clock is known.
 
-    def on_sample(self, sample: wire.Sample, board_s: float) -> None:
-        """Receive a force sample (called by the link)."""
-        number = self._numbers.of(sample.number)
-        if self._next_number is not None:
-            self.lost_samples += max(number - self._next_number, 0)
-        self._next_number = number + 1
-        with self._guard:
-            self._samples.append(ForceSample(board_s, sample.level))
+        Raises
+        ------
+        DeviceError
+            Nothing answers, the board has another firmware, or its sketch cannot drive the stated wiring.
+        """
+        settings = self.settings
+        identity = self.command("I", STARTS_WITHIN_S)
+        if not isinstance(identity, wire.Identity) or identity.name != wire.NAME:
+            raise DeviceError(f"The board on {settings.port} must run the sketch {wire.NAME}, but does not: upload it.")
+        if identity.protocol != wire.PROTOCOL:
+            raise DeviceError(
+                f"The board on {settings.port} must speak protocol {wire.PROTOCOL}, but its firmware "
+                f"{identity.version} speaks {identity.protocol}: upload the sketch of this fingervision "
+                "(fingervision/testbed/firmware)."
+            )
+        self.name = f"{identity.name} {identity.version} on {settings.port}"
+        session = random.SystemRandom().randrange(1, 0x10000)
+        self.command("U")
+        for role, line in sorted(settings.lines.items()):
+            self.command(f"M {int(role):X} {line.pin:X} {int(line.active_high)}")
+        times = f"{settings.force_period_ms:X} {settings.silence_ms:X} {settings.settle_ms:X}"
+        started = self.command(f"G {session:X} {times}")
+        assert isinstance(started, wire.Answer)  # noqa: S101 - only I is answered otherwise
+        self.on_message(started, 0.0)
+        self.keep_awake(session)
+        until_s = self._clock.now_s() + JOINED_WITHIN_S
+        while self.joined is None:
+            if self._clock.now_s() > until_s:
+                raise DeviceError(
+                    f"{self.name} must send readable replies, but most of them are damaged: check its cable."
+                )
+            self.wait(ASK_EVERY_S)
 
     def _do(self, words: str) -> None:
         try:
-            self._link.command(words)
+            self.command(words)
         except BoardRefusalError as refusal:
             self._explain(refusal.reason)
 
@@ -216,48 +230,13 @@ def opened(settings: BoardSettings, clock: Clock) -> Board:
         There is no such port, another program has it, nothing answers, it has another firmware, or its sketch cannot
         drive the stated wiring.
     """
-    link = BoardLink(opened_port(settings.port), clock)
+    board = Board(settings, opened_port(settings.port), clock)
     try:
-        board = Board(settings, link, _identified(link, settings.port))
-        _set_up(board, link, settings)
-        _wait_for_clock(board, link, clock)
+        board.set_up()
     except BaseException:
-        link.close()
+        board.disconnect()
         raise
     return board
-
-
-def _identified(link: BoardLink, port: str) -> wire.Identity:
-    identity = link.command("I", STARTS_WITHIN_S)
-    if not isinstance(identity, wire.Identity) or identity.name != wire.NAME:
-        raise DeviceError(f"The board on {port} must run the sketch {wire.NAME}, but does not: upload it.")
-    if identity.protocol != wire.PROTOCOL:
-        raise DeviceError(
-            f"The board on {port} must speak protocol {wire.PROTOCOL}, but its firmware {identity.version} speaks "
-            f"{identity.protocol}: upload the sketch of this fingervision (fingervision/testbed/firmware)."
-        )
-    return identity
-
-
-def _set_up(board: Board, link: BoardLink, settings: BoardSettings) -> None:
-    session = random.SystemRandom().randrange(1, 0x10000)
-    link.command("U")
-    for role, line in sorted(settings.lines.items()):
-        link.command(f"M {int(role):X} {line.pin:X} {int(line.active_high)}")
-    started = link.command(f"G {session:X} {settings.force_period_ms:X} {settings.silence_ms:X} {settings.settle_ms:X}")
-    assert isinstance(started, wire.Answer)  # noqa: S101 - only I is answered otherwise
-    board.on_state(started)
-    link.keep_awake(session, board)
-
-
-def _wait_for_clock(board: Board, link: BoardLink, clock: Clock) -> None:
-    until_s = clock.now_s() + JOINED_WITHIN_S
-    while link.joined is None:
-        if clock.now_s() > until_s:
-            raise DeviceError(
-                f"{board.name} must send readable replies, but most of them are damaged: check its cable."
-            )
-        board.wait(ASK_EVERY_S)
 
 
 KEY = "board"

@@ -8,10 +8,10 @@ clocks of board and computer.
 import errno
 import os
 import random
+from abc import ABC, abstractmethod
 from contextlib import suppress
 from pathlib import Path
 from threading import Condition, Lock, Thread
-from typing import Protocol
 
 import serial
 from serial.tools.list_ports import comports
@@ -121,24 +121,8 @@ class BoardRefusalError(FingervisionError):
         self.reason = reason
 
 
-class Listener(Protocol):
-    """Receiver of the board's unsolicited messages; called by the link's thread."""
-
-    def on_state(self, answer: wire.Answer) -> None:
-        """Receive the state, about fifty times a second."""
-        ...
-
-    def on_change(self, change: wire.Change, board_s: float) -> None:
-        """Receive a change of lines."""
-        ...
-
-    def on_sample(self, sample: wire.Sample, board_s: float) -> None:
-        """Receive a force sample."""
-        ...
-
-
-class BoardLink:
-    """The connection through one open port.
+class BoardLink(ABC):
+    """The connection through one open port; a subclass receives its messages, in the thread of the connection.
 
     Parameters
     ----------
@@ -158,7 +142,6 @@ class BoardLink:
     def __init__(self, port: serial.Serial, clock: Clock) -> None:
         self.damaged_lines = 0
         self._port, self._clock = port, clock
-        self._listener: Listener | None = None
         self._session: int | None = None
         self._failure: str | None = None
         self._awake = self.stopping = False
@@ -175,9 +158,13 @@ class BoardLink:
         self._thread = Thread(target=self._read_on, name=f"board on {port.name}", daemon=True)
         self._thread.start()
 
-    def keep_awake(self, session: int, listener: Listener) -> None:
-        """Start to request the state and to pass messages to a listener; fail if the board is lost or was reset."""
-        self._session, self._listener = session, listener
+    @abstractmethod
+    def on_message(self, message: wire.Answer | wire.Change | wire.Sample, board_s: float) -> None:
+        """Receive a state (about fifty in a second), a change of lines or a force sample, with the board's time."""
+
+    def keep_awake(self, session: int) -> None:
+        """Start to request the state; fail if the board is lost or was reset."""
+        self._session = session
         self._last_heard_s = self._clock.now_s()
         self._awake = True
 
@@ -191,6 +178,7 @@ class BoardLink:
         with self._news:
             if self._failure is None:
                 self._news.wait(seconds)
+        self.check()
 
     def command(self, words: str, within_s: float = ANSWER_WITHIN_S) -> wire.Answer | wire.Identity:
         """Send a command, repeat the command if the response is lost, and return the response.
@@ -228,7 +216,7 @@ class BoardLink:
         """
         self.stopping = True
 
-    def close(self) -> None:
+    def disconnect(self) -> None:
         """Close the port; closing twice is allowed."""
         self._closed = True
         self._thread.join(timeout=1.0)
@@ -295,11 +283,7 @@ class BoardLink:
             return
         self._last_heard_s = got_s
         if isinstance(message, wire.Sample | wire.Change):
-            board_s = self._time_us.of(message.time_us) / US_PER_S
-            if self._listener is not None and isinstance(message, wire.Sample):
-                self._listener.on_sample(message, board_s)
-            elif self._listener is not None and isinstance(message, wire.Change):
-                self._listener.on_change(message, board_s)
+            self.on_message(message, self._time_us.of(message.time_us) / US_PER_S)
             return
         if isinstance(message, wire.Answer) and self._session is not None:
             if message.session != self._session:
@@ -310,12 +294,10 @@ class BoardLink:
                 return
             if message.cause != wire.GOING:
                 self.stopping = False
+            board_s = self._time_us.of(message.time_us) / US_PER_S
             if message.number in self._asked_s:
-                earliest_s = self._asked_s.pop(message.number)
-                board_s = self._time_us.of(message.time_us) / US_PER_S
-                self._join.add(board_s, earliest_s, got_s - BYTE_S * (len(line) + 1))
-            if self._listener is not None:
-                self._listener.on_state(message)
+                self._join.add(board_s, self._asked_s.pop(message.number), got_s - BYTE_S * (len(line) + 1))
+            self.on_message(message, board_s)
         if message.number < NUMBERS:
             with self._news:
                 self._answers[message.number] = message

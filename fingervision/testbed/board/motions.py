@@ -1,8 +1,7 @@
 """Motions through a board: codes and times of the controller, handshakes in a thread, and the resulting position."""
 
 import gc
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from threading import Event, Thread
 from typing import Annotated
@@ -64,107 +63,6 @@ LINE_WITHIN_S = 0.3
 WAIT_S = 0.01
 
 
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Suspend Python's cyclic garbage collection, which may stop all threads for 0.1 s.
-
-    The board would interpret a pause of the computer as a lost connection, and stop the motor.
-    """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
-
-
-@dataclass(frozen=True, slots=True)
-class Handshake:
-    """The signal lines of one board.
-
-    Parameters
-    ----------
-    board : Board
-        The board, after its set-up.
-    clock : Clock
-        Clock of the test bed.
-    busy_s : float
-        Longest time between the drive line and the controller's busy signal.
-    stopped : threading.Event
-        Event that is set when the motion should end.
-    """
-
-    board: Board
-    clock: Clock
-    busy_s: float
-    stopped: Event
-
-    def run(self, code: int, at_most_s: float, on_driven: Callable[[float], None]) -> bool:
-        """Execute the step of a code to its end; return False if it was stopped, or ended by the board.
-
-        Parameters
-        ----------
-        code : int
-            Code on the select lines.
-        at_most_s : float
-            Longest duration of the motion.
-        on_driven : callable
-            Called with the computer's time at which the drive line rose.
-
-        Raises
-        ------
-        DeviceError
-            A phase of the handshake did not occur; the drive line is then off.
-        """
-        with _no_collection():
-            return self._run(code, at_most_s, on_driven)
-
-    def _run(self, code: int, at_most_s: float, on_driven: Callable[[float], None]) -> bool:
-        self.board.run(code, self.busy_s + at_most_s)
-        within_s = 1e-3 * self.board.settings.settle_ms + LINE_WITHIN_S
-        driven = self._came(wire.Levels.DRIVE, within_s, "the board has not raised its drive line")
-        if not driven:
-            return False
-        # If the message of this change was damaged, the change was found in the reported state: take the present time.
-        at_s, now_s = self.board.driven_board_s, self.clock.now_s()
-        on_driven(now_s if at_s is None else min(self.board.clock.host_at(at_s), now_s))
-        done = (
-            self._came(wire.Levels.BUSY_SEEN, self.busy_s, "the motor controller has not become busy")
-            and self._went(wire.Levels.BUSY, at_most_s, "the motor controller was still busy")
-        )  # fmt: skip
-        if not done:
-            return False
-        self.board.release()
-        if Role.IN_POSITION in self.board.settings.lines:
-            return self._came(
-                wire.Levels.IN_POSITION, LINE_WITHIN_S, "the motor controller has not signalled that it is in position"
-            )
-        return True
-
-    def _came(self, level: wire.Levels, within_s: float, otherwise: str) -> bool:
-        return self._until(lambda: level in self.board.levels, within_s, f"{otherwise} within {within_s:.3g} s")
-
-    def _went(self, level: wire.Levels, within_s: float, otherwise: str) -> bool:
-        return self._until(lambda: level not in self.board.levels, within_s, f"{otherwise} after {within_s:.3g} s")
-
-    def _until(self, holds: Callable[[], bool], within_s: float, otherwise: str) -> bool:
-        until_s = self.clock.now_s() + within_s
-        while not holds():
-            if self._ended():
-                return False
-            if self.clock.now_s() > until_s:
-                self.board.stop()
-                raise DeviceError(
-                    f"A motion was interrupted, because {otherwise}: check the wiring, and home the stage."
-                )
-            self.board.wait(WAIT_S)
-        return not self._ended()
-
-    def _ended(self) -> bool:
-        return self.stopped.is_set() or self.board.dropped is not None
-
-
 STILL = MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -201,7 +99,6 @@ class Motions:
         self._worker: Thread | None = None
         self._stopped = Event()
         self._ready_s = clock.now_s()
-        self._handshake = Handshake(board, clock, controller.busy_within_s, self._stopped)
 
     @property
     def busy(self) -> bool:
@@ -234,6 +131,9 @@ class Motions:
             self._worker.join(timeout=seconds)
 
     def _work(self, runs: Sequence[Run]) -> None:
+        was_on = gc.isenabled()
+        # A collection may stop all threads for 0.1 s, which the board would take for a lost connection.
+        gc.disable()
         try:
             self._clock.wait_until(self._ready_s)
             for run in runs:
@@ -242,11 +142,13 @@ class Motions:
         except FingervisionError as error:
             self.path.break_off(self._clock.now_s())
             self.failure = str(error)
+        finally:
+            if was_on:
+                gc.enable()
 
     def _do(self, run: Run) -> bool:
         known, self.known = self.known, False
-        motion = STILL if run.motion is None else run.motion.motion
-        done = self._handshake.run(run.code, run.at_most_s, lambda at_s: self.path.begin(at_s, motion))
+        done = self._shake(run)
         now_s = self._clock.now_s()
         if not done:
             self.path.break_off(now_s)
@@ -254,3 +156,46 @@ class Motions:
         self.path.jump(now_s, 0.0 if run.motion is None else run.motion.to_mm)
         self.known = known or run.motion is None or run.motion.step.coordinates is Coordinates.ABSOLUTE
         return True
+
+    # The handshake: each phase has its own time limit.
+
+    def _shake(self, run: Run) -> bool:
+        """Execute the step of a code to its end; return False if it was stopped, or ended by the board."""
+        board, busy_s = self._board, self._controller.busy_within_s
+        board.run(run.code, busy_s + run.at_most_s)
+        within_s = 1e-3 * board.settings.settle_ms + LINE_WITHIN_S
+        if not self._until(wire.Levels.DRIVE, within_s, "the board has not raised its drive line within"):
+            return False
+        # If the message of this change was damaged, the change was found in the reported state: take the present time.
+        at_s, now_s = board.driven_board_s, self._clock.now_s()
+        driven_s = now_s if at_s is None else min(board.clock.host_at(at_s), now_s)
+        self.path.begin(driven_s, STILL if run.motion is None else run.motion.motion)
+        if not (
+            self._until(wire.Levels.BUSY_SEEN, busy_s, "the motor controller has not become busy within")
+            and self._until(wire.Levels.BUSY, run.at_most_s, "the motor controller was still busy after", goes=True)
+        ):
+            return False
+        board.release()
+        return Role.IN_POSITION not in board.settings.lines or self._until(
+            wire.Levels.IN_POSITION,
+            LINE_WITHIN_S,
+            "the motor controller has signalled no position within",
+        )
+
+    def _until(self, level: wire.Levels, within_s: float, otherwise: str, *, goes: bool = False) -> bool:
+        """Wait until a line becomes active, or goes off; return False if the motion has ended otherwise."""
+        until_s = self._clock.now_s() + within_s
+        while (level in self._board.levels) is goes:
+            if self._ended():
+                return False
+            if self._clock.now_s() > until_s:
+                self._board.stop()
+                raise DeviceError(
+                    f"A motion was interrupted, because {otherwise} {within_s:.3g} s: check the wiring, and home the "
+                    "stage."
+                )
+            self._board.wait(WAIT_S)
+        return not self._ended()
+
+    def _ended(self) -> bool:
+        return self._stopped.is_set() or self._board.dropped is not None
