@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from fingervision.domain.errors import DeviceError, LimitError, StateError
 from fingervision.domain.field import names_of
 from fingervision.domain.step_data import Coordinates, StepData
@@ -156,9 +158,12 @@ class BoardActuator(Routes):
         """Positions since the last call, computed by the host on its own clock from the executed steps."""
         self._board.check()
         now_s = self._clock.now_s()
-        times = [*self._motions.path.times_of_motion_s(self._read_s, now_s, READ_EVERY_S).tolist(), now_s]
+        path, times = self._motions.path, np.arange(self._read_s + READ_EVERY_S, now_s, READ_EVERY_S)
+        times = np.append(times[path.moves(times)], now_s)
         self._read_s = now_s
-        return tuple(Reading(at_s, at_s, at_s, self._motions.path.at_mm(at_s)) for at_s in times)
+        return tuple(
+            Reading(at_s, at_s, at_s, mm) for at_s, mm in zip(times.tolist(), path.at_mm(times).tolist(), strict=True)
+        )
 
     def close(self) -> None:
         """Stop and release the board."""
@@ -195,7 +200,7 @@ class BoardActuator(Routes):
     # Execution of a motion.
 
     def _at_mm(self) -> float:
-        return self._motions.path.at_mm(self._clock.now_s())
+        return float(self._motions.path.at_mm(self._clock.now_s()))
 
     def _begin_steps(self, numbers: Sequence[int]) -> None:
         runs: list[Run] = []

@@ -14,7 +14,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.board import Board
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.motion.motion_profile import CommandedPath, MotionProfile
+from fingervision.testbed.motion.motion_profile import MotionPath, MotionProfile
 from fingervision.testbed.motion.step_checks import PlannedMotion
 
 HIGHEST_CODE, LONGEST_S = 15, 60.0
@@ -91,7 +91,7 @@ class Motions:
     """
 
     def __init__(self, board: Board, controller: Controller, clock: Clock, start_mm: float) -> None:
-        self.path = CommandedPath(start_mm)
+        self.path = MotionPath(start_mm)
         # After a start or a stop, the position is known only after an absolute step or homing.
         self.known = False
         self.failure: str | None = None

@@ -1,4 +1,4 @@
-"""Trapezoidal speed profile of one motion, and the position over time where no encoder is readable.
+"""Trapezoidal speed profile of one motion, and the position over time that follows from several motions.
 
 The formulas of the profile are those of uniformly accelerated motion. With equal acceleration and deceleration, a
 triangular speed profile of distance s and time T has the peak speed v = 2 s / T and the acceleration a = 4 s / T^2; a
@@ -8,7 +8,7 @@ has the least acceleration, and so the least force.
 """
 
 from dataclasses import dataclass
-from math import inf, sqrt
+from math import copysign, inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,20 +144,14 @@ def _at_speed(distance_mm: float, entry: SpeedEntry) -> MotionProfile:
     )
 
 
-# Position over time of an actuator without a readable encoder, computed from its motion profiles.
+# Position over time: that of the simulated stage, and of an actuator without a readable encoder.
+
+Piece = tuple[float, float, float, float, float]
+"""A piece of a path: start time, position and speed at the start, acceleration, duration."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Piece:
-    begin_s: float
-    from_mm: float
-    motion: MotionProfile
-    # End of the motion; earlier than planned if the motion was interrupted.
-    until_s: float
-
-
-class CommandedPath:
-    """Position over time, constant between motions.
+class MotionPath:
+    """Position over time, for all past times and for the planned motion; constant between motions.
 
     Parameters
     ----------
@@ -166,39 +160,67 @@ class CommandedPath:
     """
 
     def __init__(self, at_mm: float) -> None:
-        self._pieces: list[_Piece] = [_Piece(-np.inf, at_mm, MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0), np.inf)]
+        # This tuple is always replaced as a whole, because another thread may end a motion while this thread reads the
+        # position.
+        self._pieces: tuple[Piece, ...] = ((-inf, at_mm, 0.0, 0.0, 0.0),)
+        self.version = 0
+
+    @property
+    def planned_until_s(self) -> float:
+        """End of the present motion (s); minus infinity before the first motion."""
+        begin_s, _, _, _, duration_s = self._pieces[-1]
+        return begin_s + duration_s
 
     def begin(self, begin_s: float, motion: MotionProfile) -> None:
-        """Begin a motion at the position where the last one ended."""
-        self._pieces.append(_Piece(begin_s, self.at_mm(begin_s), motion, np.inf))
+        """Begin a motion at the position of this time."""
+        at_mm, sign = float(self.at_mm(begin_s)), copysign(1.0, motion.distance_mm)
+        speed, up, down = (
+            sign * each for each in (motion.speed_mm_s, motion.acceleration_mm_s2, -motion.deceleration_mm_s2)
+        )
+        pieces = self._until(begin_s)
+        for at_first, acceleration, duration_s in (
+            (0.0, up, motion.speeding_s), (speed, 0.0, motion.cruising_s), (speed, down, motion.slowing_s),
+        ):  # fmt: skip
+            pieces.append((begin_s, at_mm, at_first, acceleration, duration_s))
+            at_mm += at_first * duration_s + 0.5 * acceleration * duration_s**2
+            begin_s += duration_s
+        self._replace(pieces)
 
     def jump(self, time_s: float, to_mm: float) -> None:
-        """Set the position from a time on, after homing or after a turn by hand."""
-        self._pieces.append(_Piece(time_s, to_mm, MotionProfile(0.0, 0.0, 0.0, 0.0, 0.0), np.inf))
+        """Set the position from a time on, after homing or where a motion has ended otherwise than planned."""
+        self._replace([*self._until(time_s), (time_s, to_mm, 0.0, 0.0, 0.0)])
 
-    def break_off(self, time_s: float) -> None:
-        """End the present motion at a time."""
-        last = self._pieces[-1]
-        self._pieces[-1] = _Piece(last.begin_s, last.from_mm, last.motion, max(time_s, last.begin_s))
+    def break_off(self, time_s: float, deceleration_mm_s2: float = inf) -> None:
+        """End the present motion at a time, by a deceleration."""
+        if time_s >= self.planned_until_s:
+            return
+        *before, (begin_s, from_mm, speed, acceleration, _) = self._until(time_s)
+        since_s = time_s - begin_s
+        at_mm, now_mm_s = from_mm + speed * since_s + 0.5 * acceleration * since_s**2, speed + acceleration * since_s
+        braking_s, brake = abs(now_mm_s) / deceleration_mm_s2, -copysign(deceleration_mm_s2, now_mm_s)
+        end = (time_s, at_mm, now_mm_s, brake, braking_s) if braking_s else (time_s, at_mm, 0.0, 0.0, 0.0)
+        self._replace([*before, (begin_s, from_mm, speed, acceleration, since_s), end])
 
-    def at_mm(self, time_s: float) -> float:
-        """Position at a time (mm)."""
-        piece = next((each for each in reversed(self._pieces) if each.begin_s <= time_s), self._pieces[0])
-        since_s = min(time_s, piece.until_s) - piece.begin_s
-        return piece.from_mm + float(piece.motion.travelled_mm(np.array([since_s]))[0])
+    def moves(self, time_s: Floats) -> NDArray[np.bool_]:
+        """Whether a motion is in progress at the given times, shape (n,)."""
+        rows = self._pieces_at(time_s)
+        return np.asarray(time_s < rows[:, 0] + rows[:, 4], dtype=np.bool_)
 
-    def times_of_motion_s(self, from_s: float, to_s: float, every_s: float) -> Floats:
-        """Times at intervals of `every_s`, between two times, at which the stage is in motion (s).
+    def at_mm(self, time_s: Floats | float) -> Floats:
+        """Positions at the given times, shape (n,) (mm)."""
+        rows = self._pieces_at(time_s)
+        begin_s = np.where(np.isfinite(rows[..., 0]), rows[..., 0], time_s)
+        since_s = np.minimum(time_s - begin_s, rows[..., 4])
+        return np.asarray(rows[..., 1] + rows[..., 2] * since_s + 0.5 * rows[..., 3] * since_s**2, dtype=np.float64)
 
-        Returns
-        -------
-        ndarray of float, shape (n,)
-        """
-        times = []
-        for piece in self._pieces:
-            end_s = min(to_s, piece.until_s, piece.begin_s + piece.motion.seconds)
-            begin_s = max(from_s, piece.begin_s)
-            if piece.motion.seconds > 0.0 and begin_s < end_s:
-                times.append(np.arange(begin_s + every_s, end_s, every_s))
-        found = np.concatenate(times) if times else np.empty(0)
-        return found[found < to_s]
+    def _until(self, time_s: float) -> list[Piece]:
+        """Pieces that have begun until a time."""
+        return [piece for piece in self._pieces if piece[0] <= time_s]
+
+    def _replace(self, pieces: list[Piece]) -> None:
+        self._pieces = tuple(pieces)
+        self.version += 1
+
+    def _pieces_at(self, time_s: Floats | float) -> Floats:
+        pieces = np.array(self._pieces)
+        return np.asarray(pieces[np.searchsorted(pieces[:, 0], time_s, side="right") - 1])

@@ -1,13 +1,11 @@
 """Motion of a stage, composed of pieces of constant acceleration."""
 
-from math import copysign, sqrt
+from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Piece = tuple[float, float, float, float, float]
-"""A piece of the motion: start time, position and speed at the start, acceleration, duration."""
+from fingervision.domain.step_data import SpeedEntry
+from fingervision.testbed.motion.motion_profile import MotionPath, profile
 
 # With 16 m/s2, the published stage moves by its 10 mm within 50 ms, with a triangular speed profile up to 400 mm/s (v =
 # 2 s / T, a = 4 s / T^2).
@@ -16,7 +14,7 @@ ACCELERATION_MM_S2 = 16000.0
 LEAD_PERIODS_MM, LEAD_SHARES = (7.3, 2.9, 1.1), (0.55, 0.3, 0.15)
 
 
-class SimulatedStage:
+class SimulatedStage(MotionPath):
     """True position of the simulated stage, for all past times and for the planned motion.
 
     Parameters
@@ -31,20 +29,11 @@ class SimulatedStage:
     """
 
     def __init__(self, lower_mm: float, upper_mm: float, accuracy_mm: float, rng: np.random.Generator) -> None:
+        super().__init__(0.0)
         self.lower_mm, self.upper_mm = lower_mm, upper_mm
         self._accuracy_mm = accuracy_mm
         self._phases = rng.uniform(0.0, 2.0 * np.pi, len(LEAD_PERIODS_MM))
-        # This tuple is always replaced as a whole, because another thread may stop the stage while this thread reads
-        # the position.
-        self._pieces: tuple[Piece, ...] = ((-np.inf, 0.0, 0.0, 0.0, 0.0),)
         self.homed_s: list[float] = []
-        self.version = 0
-
-    @property
-    def planned_until_s(self) -> float:
-        """End of the present motion (s); minus infinity before the first motion."""
-        begin_s, _, _, _, duration_s = self._pieces[-1]
-        return begin_s + duration_s
 
     @property
     def began_s(self) -> float:
@@ -66,39 +55,14 @@ class SimulatedStage:
         """Begin a motion; a motion in progress is ended first."""
         self.halt(now_s)
         begin_s = max(now_s, self.planned_until_s)
-        from_mm = float(self.at_mm(np.array([begin_s]))[0])
-        way_mm = self.lands_at_mm(target_mm) - from_mm
-        if way_mm == 0.0:
-            return
-        a = ACCELERATION_MM_S2
-        top_mm_s = min(speed_mm_s, sqrt(abs(way_mm) * a))
-        ramp_s = top_mm_s / a
-        cruise_s = max(abs(way_mm) / top_mm_s - ramp_s, 0.0)
-        v, a = copysign(top_mm_s, way_mm), copysign(a, way_mm)
-        pieces = list(self._pieces)
-        for speed, acceleration, duration_s in ((0.0, a, ramp_s), (v, 0.0, cruise_s), (v, -a, ramp_s)):
-            pieces.append((begin_s, from_mm, speed, acceleration, duration_s))
-            from_mm += speed * duration_s + 0.5 * acceleration * duration_s**2
-            begin_s += duration_s
-        self._pieces = tuple(pieces)
-        self.version += 1
+        way_mm = self.lands_at_mm(target_mm) - float(self.at_mm(begin_s))
+        if way_mm != 0.0:
+            ramps = SpeedEntry(speed_mm_s, ACCELERATION_MM_S2, ACCELERATION_MM_S2)
+            self.begin(begin_s, profile(way_mm, ramps, inf))
 
     def halt(self, now_s: float) -> None:
         """End the present motion as fast as the stage can."""
-        if now_s >= self.planned_until_s:
-            return
-        begun = [piece for piece in self._pieces if piece[0] <= now_s]
-        begin_s, from_mm, speed, acceleration, _ = begun[-1]
-        since_s = now_s - begin_s
-        at_mm = from_mm + speed * since_s + 0.5 * acceleration * since_s**2
-        speed += acceleration * since_s
-        braking_s = abs(speed) / ACCELERATION_MM_S2
-        self._pieces = (
-            *begun[:-1],
-            (begin_s, from_mm, begun[-1][2], acceleration, since_s),
-            (now_s, at_mm, speed, -copysign(ACCELERATION_MM_S2, speed), braking_s),
-        )
-        self.version += 1
+        self.break_off(now_s, ACCELERATION_MM_S2)
 
     def home(self, now_s: float, speed_mm_s: float) -> None:
         """Move to the reference; a new run begins there, with the correct zero."""
@@ -111,19 +75,3 @@ class SimulatedStage:
         ends = [(begin_s, begin_s + duration_s) for begin_s, _, _, _, duration_s in self._pieces[1:]]
         joined = {begin_s for begin_s, _ in ends} & {end_s for _, end_s in ends}
         return sorted({at for piece in ends for at in piece if at not in joined and after_s < at <= until_s})
-
-    def moves(self, time_s: Array) -> NDArray[np.bool_]:
-        """Whether the stage moves at the given times of the test bed, shape (n,)."""
-        rows = self._pieces_at(time_s)
-        return np.asarray(time_s < rows[:, 0] + rows[:, 4], dtype=np.bool_)
-
-    def at_mm(self, time_s: Array) -> Array:
-        """True positions at the given times of the test bed, shape (n,) (mm)."""
-        rows = self._pieces_at(time_s)
-        rows[:, 0] = np.where(np.isfinite(rows[:, 0]), rows[:, 0], time_s)
-        since_s = np.minimum(time_s - rows[:, 0], rows[:, 4])
-        return np.asarray(rows[:, 1] + rows[:, 2] * since_s + 0.5 * rows[:, 3] * since_s**2, dtype=np.float64)
-
-    def _pieces_at(self, time_s: Array) -> Array:
-        pieces = np.array(self._pieces)
-        return np.asarray(pieces[np.searchsorted(pieces[:, 0], time_s, side="right") - 1])
