@@ -2,9 +2,9 @@
 
 import importlib
 import pkgutil
-from collections.abc import Callable
-from contextlib import suppress
-from typing import Any, Generic, NoReturn, Protocol, cast
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, Generic, Protocol, cast
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.plugins.faults import MisfitError, PluginShapeError
@@ -41,12 +41,8 @@ def guarded(build: Callable[[], Any], protocol: type, who: str, origin: Origin) 
     PluginShapeError
         The device could not be built, or does not meet its protocol; it is closed in that case.
     """
-    try:
+    with _faults(who, "be built", origin):
         device = build()
-    except FingervisionError:
-        raise
-    except Exception as error:
-        _say(who, "be built", error, origin)
     kept = _Guarded(device, who, origin)
     try:
         _look_at(kept, device, protocol, who, origin)
@@ -88,24 +84,16 @@ class _Guarded:
         self._device, self._who, self._origin = device, who, origin
 
     def __getattr__(self, name: str) -> Any:
-        try:
+        if not (hasattr(type(self._device), name) or name in getattr(self._device, "__dict__", {})):
+            return getattr(self._device, name)
+        with _faults(self._who, f"return its {name}", self._origin):
             found = getattr(self._device, name)
-        except FingervisionError:
-            raise
-        except Exception as error:
-            if not hasattr(type(self._device), name):
-                raise
-            _say(self._who, f"return its {name}", error, self._origin)
         if not callable(found) or isinstance(found, type):
             return found
 
         def called(*arguments: Any, **named: Any) -> Any:
-            try:
+            with _faults(self._who, f"return a result from {name}", self._origin):
                 answer = found(*arguments, **named)
-            except FingervisionError:
-                raise
-            except Exception as error:
-                _say(self._who, f"return a result from {name}", error, self._origin)
             if name == "readings":
                 _check_readings(answer, self._who, self._origin)
             return answer
@@ -113,9 +101,16 @@ class _Guarded:
         return called
 
 
-def _say(who: str, what: str, error: Exception, origin: Origin) -> NoReturn:
-    said = f"{type(error).__name__}{f': {error}' if str(error) else ''}".replace("\n", " ")[:200].rstrip(".")
-    raise PluginShapeError(f"{who} must {what}, but raised {said}: {origin.remedy}.") from error
+@contextmanager
+def _faults(who: str, what: str, origin: Origin) -> Iterator[None]:
+    """Turn exceptions of a device into errors that name it."""
+    try:
+        yield
+    except FingervisionError:
+        raise
+    except Exception as error:
+        said = f"{type(error).__name__}{f': {error}' if str(error) else ''}".replace("\n", " ")[:200].rstrip(".")
+        raise PluginShapeError(f"{who} must {what}, but raised {said}: {origin.remedy}.") from error
 
 
 PACKAGES = {"actuator": actuators, "force_sensor": force_sensors, "camera": cameras}

@@ -23,7 +23,7 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, RefusedError, StageLimits, in_a_line
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import Reading
-from fingervision.testbed.motion.move_limits import LIMIT_KEYS, FreeMoves, check_move, check_speed, stage_limits
+from fingervision.testbed.motion.move_limits import LIMIT_KEYS, FreeMoves, check_move, stage_limits
 
 T = TypeVar("T")
 KEYS = (*LIMIT_KEYS, "zero_mm", "reversed")
@@ -271,13 +271,6 @@ class SingleAxis(FreeMoves, ABC):
                     f"{has}: home it, and check zero_mm and the units. Nothing was moved."
                 )
             self._start(at_mm, to_mm, speed_mm_s)
-
-    def jog(self, speed_mm_s: float) -> None:
-        """Begin to move until stopped or until a limit is reached."""
-        check_speed(self.limits, abs(speed_mm_s))
-        if speed_mm_s != 0.0:
-            # The device's own continuous motion would ignore the limits in the test bed's configuration.
-            self.move(self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm, abs(speed_mm_s))
 
     def stop(self) -> None:
         """Stop the motion at once, without waiting for a question that is being asked."""

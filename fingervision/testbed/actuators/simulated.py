@@ -12,7 +12,7 @@ from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import Reading
-from fingervision.testbed.motion.move_limits import FreeMoves, check_move, check_speed, stage_limits
+from fingervision.testbed.motion.move_limits import FreeMoves, check_move, stage_limits
 from fingervision.testbed.simulation.drifting_clock import OwnClock
 from fingervision.testbed.simulation.gripper import Motion
 from fingervision.testbed.simulation.stage import SimulatedStage
@@ -85,14 +85,6 @@ class SimulatedActuator(FreeMoves):
         check_move(self.limits, to_mm, speed_mm_s)
         self._ready()
         self._stage.go(self._clock.now_s(), to_mm, speed_mm_s)
-
-    def jog(self, speed_mm_s: float) -> None:
-        """Begin to move until stopped or until a limit is reached."""
-        check_speed(self.limits, abs(speed_mm_s))
-        self._ready()
-        if speed_mm_s != 0.0:
-            end_mm = self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm
-            self._stage.go(self._clock.now_s(), end_mm, abs(speed_mm_s))
 
     def stop(self) -> None:
         """Stop the motion at once."""

@@ -65,6 +65,16 @@ class FreeMoves:
         """Refuse motions beyond the limits of the stage."""
         check_move(self.limits, to_mm, speed_mm_s)
 
+    def move(self, to_mm: float, speed_mm_s: float) -> None:
+        """Begin to move to a position at a positive speed."""
+        raise NotImplementedError
+
+    def jog(self, speed_mm_s: float) -> None:
+        """Begin to move until stopped or until a limit is reached, by the limits of the test bed's file."""
+        check_speed(self.limits, abs(speed_mm_s))
+        if speed_mm_s != 0.0:
+            self.move(self.limits.upper_mm if speed_mm_s > 0.0 else self.limits.lower_mm, abs(speed_mm_s))
+
     def run_step(self, number: int) -> None:
         """Refuse: such a stage has no step data that a test bed could use."""
         raise LimitError(

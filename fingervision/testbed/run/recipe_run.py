@@ -133,7 +133,7 @@ class Runner:
             watch.leg = leg
             words = f"Step {leg.step}: {leg.words}."
             record.event("leg", words, leg=number, step=leg.step, frame=record.counts.recorded)
-            began_s, from_mm = watch.bed.clock.now_s() - watch.paused_s, watch.sight.position.newest
+            began_s, from_mm = watch.now_s, watch.sight.position.newest
             if watch.ratio is not None:
                 watch.ratio.begin()
             self._do(leg, number)
@@ -142,7 +142,7 @@ class Runner:
             if watch.ratio is not None and watch.ratio.interval[1] < 1.0 / LARGEST_RATIO:
                 self._warn("small_motion", f"In step {leg.step}, {watch.ratio.words}, and whether the gripper is held.")
             if isinstance(leg.act, Go) and leg.act.frames is None:
-                moved_s += watch.bed.clock.now_s() - watch.paused_s - began_s
+                moved_s += watch.now_s - began_s
                 ramps_s += watch.bed.actuator.limits.settling_s + RAMP_S
                 foreseen_s += abs(leg.act.to_mm - from_mm) / leg.act.speed_mm_s
             done_s += leg.seconds

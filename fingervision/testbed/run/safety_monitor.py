@@ -48,32 +48,28 @@ class MotionRatio:
 
     def begin(self) -> None:
         """Begin another motion."""
-        self._count, self._means, self._squares = 0, np.zeros(2), np.zeros((2, 2))
+        self._seen: list[tuple[float, float]] = []
+        self._ratio, self._u = 0.0, inf
 
     def add(self, input_mm: float, gap_mm: float) -> None:
-        """Add a frame (Welford's update of means and squares)."""
-        pair = np.array([np.interp(input_mm, self._inputs_mm, self._gaps_mm), gap_mm])
-        self._count += 1
-        before = pair - self._means
-        self._means = self._means + before / self._count
-        self._squares = self._squares + np.outer(before, pair - self._means)
+        """Add a frame, and fit the line."""
+        self._seen.append((float(np.interp(input_mm, self._inputs_mm, self._gaps_mm)), gap_mm))
+        predicted, seen = np.array(self._seen).T
+        if len(seen) >= FEWEST and np.ptp(predicted) > 0.0:
+            (x, both), (_, y) = np.cov(predicted, seen).tolist()
+            self._ratio = both / x
+            self._u = sqrt(max(y - self._ratio * both, 0.0) / (len(seen) - 2) / x)
 
     @property
     def interval(self) -> tuple[float, float]:
         """Ratios within which that of this motion surely lies."""
-        (predicted, both), (_, seen) = self._squares.tolist()
-        if self._count < FEWEST or predicted <= 0.0:
-            return -inf, inf
-        ratio = both / predicted
-        u = sqrt(max(seen - ratio * both, 0.0) / (self._count - 2) / predicted)
-        return ratio - SURE * u, ratio + SURE * u
+        return self._ratio - SURE * self._u, self._ratio + SURE * self._u
 
     @property
     def words(self) -> str:
         """The ratio and what to check, as a sentence without its end."""
-        (predicted, both), _ = self._squares.tolist()
         return (
-            f"the gap moved {both / predicted:.3g} times as far as the model predicts: check the units of the stage "
+            f"the gap moved {self._ratio:.3g} times as far as the model predicts: check the units of the stage "
             "(such as per_mm, counts_per_mm or microstep_mm), the scale px_per_mm, and the units of the model"
         )
 
@@ -121,6 +117,11 @@ class Watch:
     leg: Leg | None = None
     paused_s: float = 0.0
     ratio: MotionRatio | None = None
+
+    @property
+    def now_s(self) -> float:
+        """Time on the test bed's clock without pauses (s)."""
+        return self.bed.clock.now_s() - self.paused_s
 
     # Frames.
 

@@ -91,8 +91,8 @@ def go(watch: Watch, act: Go) -> None:
 
 def stand(watch: Watch, act: Stand) -> None:
     """Rest for a time."""
-    since = _Since(watch)
-    while since.s < act.seconds:
+    until_s = watch.now_s + act.seconds
+    while watch.now_s < until_s:
         watch.see(record=act.frames is None)
         watch.wait_while_paused(record=act.frames is None)
     _point(watch, act.frames)
@@ -100,17 +100,17 @@ def stand(watch: Watch, act: Stand) -> None:
 
 def swing(watch: Watch, act: Swing) -> None:
     """Move the stage sinusoidally, in short pieces."""
-    since, piece_s = _Since(watch), SWING_FRAMES / watch.sight.rate_hz
+    began_s, piece_s = watch.now_s, SWING_FRAMES / watch.sight.rate_hz
     lasts_s = act.cycles / act.frequency_hz
     at_mm = act.mean_mm
-    while (now_s := since.s) < lasts_s:
+    while (now_s := watch.now_s - began_s) < lasts_s:
         then_s = min(now_s + piece_s, lasts_s)
         to_mm = act.mean_mm + act.amplitude_mm * sin(tau * act.frequency_hz * then_s)
         if abs(to_mm - at_mm) > 1e-9 and then_s > now_s:
             speed_mm_s = max(abs(to_mm - at_mm) / (then_s - now_s), 1e-3)
             watch.follow(partial(watch.bed.actuator.move, to_mm, speed_mm_s), record=True)
             at_mm = to_mm
-        if since.s <= now_s:
+        if watch.now_s - began_s <= now_s:
             watch.see(record=True)
 
 
@@ -175,9 +175,9 @@ def _point(watch: Watch, frames: Frames) -> None:
 
 def _settle(watch: Watch) -> None:
     """Wait until the picture is at rest."""
-    since = _Since(watch)
+    until_s = watch.now_s + STILL_WITHIN_S
     last: list[GapRow] = []
-    while since.s < STILL_WITHIN_S:
+    while watch.now_s < until_s:
         _, row = watch.see(record=False)
         last = [*last[-STILL_FRAMES + 1 :], row]
         if len(last) == STILL_FRAMES and _still(last):
@@ -193,19 +193,3 @@ def _still(rows: list[GapRow]) -> bool:
         return not gaps
     u = max(row.u_random_mm or 0.0 for row in rows)
     return max(gaps) - min(gaps) < STILL_SIGMAS * u
-
-
-class _Since:
-    """Time since the object was created, without pauses (s)."""
-
-    def __init__(self, watch: Watch) -> None:
-        self._watch, self._began_s = watch, self._now_s(watch)
-
-    @property
-    def s(self) -> float:
-        """Number of seconds."""
-        return self._now_s(self._watch) - self._began_s
-
-    @staticmethod
-    def _now_s(watch: Watch) -> float:
-        return watch.bed.clock.now_s() - watch.paused_s

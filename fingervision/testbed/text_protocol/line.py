@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from time import monotonic, sleep
-from typing import Any, Protocol
+from typing import Any
 
 import serial
 
@@ -35,27 +35,6 @@ def told(port: Any, data: bytes) -> None:
             f"The device at {port.port} must take what it is told within {WRITE_S:g} s, but did not: switch it on, and "
             "check its cable and its flow control (rtscts, xonxoff)."
         ) from error
-
-
-class Port(Protocol):
-    """A port that sends bytes and receives lines."""
-
-    def write(self, data: bytes) -> object:
-        """Send bytes; may be called from any thread, and while another thread waits for a line."""
-        ...
-
-    def line(self, end: bytes, within_s: float) -> bytes:
-        """Wait for a line, or return what came of it within the time; 0 s returns what is there already."""
-        ...
-
-    @property
-    def rest(self) -> bytes:
-        """What came without the end of a line."""
-        ...
-
-    def close(self) -> None:
-        """Release the port."""
-        ...
 
 
 class SerialPort:
@@ -134,13 +113,13 @@ class Line:
 
     Parameters
     ----------
-    port : Port
+    port : SerialPort or VisaPort
         The open port.
     words : Words
         The words of the instrument.
     """
 
-    def __init__(self, port: Port, words: Words) -> None:
+    def __init__(self, port: SerialPort | VisaPort, words: Words) -> None:
         self._port, self._words, self._settings = port, words, dict(words.settings)
         self._said = ""  # the last words, which a refusal refers to
         kept = [str(each.more.get("keep", "")) for each in words.opening]
@@ -278,7 +257,9 @@ def opened_line(section: Section, words: Words) -> Line:
     name = section.word("port")
     try:
         if "::" in name:
-            port: Port = VisaPort(name, words.baud if name.startswith("ASRL") and "baud" in section.values else None)
+            port: SerialPort | VisaPort = VisaPort(
+                name, words.baud if name.startswith("ASRL") and "baud" in section.values else None
+            )
         else:
             port = SerialPort(name, words.baud, words.serial)
     except ImportError as error:
