@@ -26,7 +26,7 @@ from fingervision.models.gripper_figures import gripper_figures, unit_of
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model, disagreements, kinds, small_displacements_alone
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_figures import MECHANISM_MODELS, MechanismModel, mechanism_figures
+from fingervision.models.mechanism_figures import MECHANISM_MODELS, MechanismModel, mechanism_figures, width_effect
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import MechanismDrawing, is_mechanism, read_drawing
 from fingervision.storage.out_folder import own_folder
@@ -363,7 +363,7 @@ def predict_mechanism(
         try:
             with naming(path):
                 built = MECHANISM_MODELS[name](mechanism)
-                figures[name] = mechanism_figures(built)
+                figures[name] = mechanism_figures(built) | width_effect(built)
         except FingervisionError as error:
             refusals[name] = error
         else:

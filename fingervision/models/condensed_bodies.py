@@ -241,7 +241,7 @@ def condensed(
     try:
         solver = splu(whole)
     except RuntimeError as error:
-        x, y = frames[0].at_mm
+        x, y = np.round(frames[0].at_mm, 6) + 0.0
         raise ModelError(
             f"The body at ({x:.5g}, {y:.5g}) mm must have separate faces and flexures, but two of them share "
             "mesh nodes; check that no two faces or flexures overlap."

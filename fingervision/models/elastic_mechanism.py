@@ -68,6 +68,9 @@ class MechanismState:
     faces_mm: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
+_NOTHING_BENDS = 1e-11
+"""Stiffness of the drive, over Young's modulus times the plate's thickness, below which it is rounding: a leaf of
+thickness t and length L has about (t / L)^3, 1e-9 for 1000 times as long as thick."""
 _STEP_OF_SIZE = 1e-5
 """Input, as a share of the drawing's size, by which the change of the largest stress is computed."""
 
@@ -236,8 +239,22 @@ class ElasticMechanism(MadeAgain, ABC):
 
     @property
     def stiffness_n_mm(self) -> float:
-        """Force at the drive per 1 mm of input, at rest (N/mm)."""
-        return self.driven.input_stiffness_n_mm
+        """Force at the drive per 1 mm of input, at rest (N/mm).
+
+        Raises
+        ------
+        ModelError
+            If the drive moves the whole mechanism, or a part of it, without bending anything.
+        """
+        found, mechanism = self.driven.input_stiffness_n_mm, self.mechanism
+        stiff = mechanism.material.youngs_modulus_mpa * mechanism.plate_mm
+        moved = max((abs(drive.per_input) for drive in mechanism.drives), default=0.0)
+        if not np.any(self.driven.rest_mm) and abs(found) < _NOTHING_BENDS * stiff * moved**2:
+            raise ModelError(
+                f"The drive of {mechanism.name} must bend its flexures, but moves bodies without bending anything: "
+                "hold a body with a [[fixed]] or [[slide]] face, and check what the slides hold."
+            )
+        return found
 
     def touch_input_mm(self) -> dict[str, float]:
         """Input nearest to zero at which each contact first touches, in small displacements.

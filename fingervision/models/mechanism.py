@@ -24,6 +24,8 @@ _OVER_DEPTH = 0.02
 (`tests/benchmarks/models_three_dimensions.py`)."""
 _MOST_NAMED = 3
 """Pieces of a drawing that a message names."""
+_BETWEEN_ROOTS = 0.8
+"""Part of a flexure's length that a clamp must leave free: its ends lie in bodies, at whose faces a box may end."""
 _SAME_AREA = 1e-2
 """Relative difference below which two areas count as equal: areas of regions with arcs are computed from polygons, with
 an error of 1e-3."""
@@ -430,6 +432,19 @@ def _check_points(mechanism: Mechanism, region: PlanarRegion, by_layer: Mapping[
         near = 1e-6 * size * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])
         if drive.face.is_pin and not region.holds(np.array([[x], [y]]) + near).any():
             raise DataError(f"pin {drive.face.name} of {name} must lie on the body, but ({x:g}, {y:g}) mm is outside.")
+    for flexure in mechanism.flexures:
+        own = by_layer[flexure.layer]
+        along = np.repeat(_BETWEEN_ROOTS * flexure.half_length_mm * np.linspace(-1.0, 1.0, 33), 2)
+        above = np.tile([-0.5, 0.5], 33) * flexure.height_mm(along)
+        surface, beside = (np.stack(flexure.section_mm(along, s * above)) for s in (1.0, 1.0 + 1e-2))
+        surface = surface[:, ~own.holds(beside)]
+        for face in mechanism.fixed:
+            if (held := surface[:, face.holds(surface, 0.0)]).size:
+                x, y = held[:, held.shape[1] // 2]
+                raise DataError(
+                    f"fixed face {face.name} of {name} must end where the bodies do, but its box holds flexure "
+                    f"{flexure.name} at ({x:.4g}, {y:.4g}) mm too; make the box smaller."
+                )
     for face in (*mechanism.fixed, *(drive.face for drive in mechanism.drives)):
         if hypot(*face.box_mm) > 1e6:
             raise DataError(f"face {face.name} of {name} must have a box_mm with finite limits.")

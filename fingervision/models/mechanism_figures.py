@@ -237,7 +237,7 @@ def response_figures(model: MechanismModel) -> dict[str, float]:
 
 
 def mechanism_figures(model: MechanismModel) -> dict[str, float]:
-    """Compute the figures of `response_figures`, the part of the force from the plate's width, and the model's errors.
+    """Compute the figures of `response_figures`, and the errors of the model.
 
     Finite elements also give the effects of weight, temperature and a gripped part, and the motions out of the plane.
 
@@ -252,8 +252,6 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
         Numbers by name, with the unit at the end of the name.
     """
     figures = response_figures(model)
-    if model.mechanism.flexures and not np.any(model.driven.rest_mm) and (plane := model.in_plane_stress) is not None:
-        figures["width_effect_force_percent"] = 100.0 * (model.stiffness_n_mm / plane.stiffness_n_mm - 1.0)
     errors = {
         "model_error_motion_percent": 100.0 * _MOTION_ERROR * model.force_error,
         "model_error_force_percent": 100.0 * model.force_error,
@@ -275,6 +273,16 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
             errors["model_error_out_of_plane_percent"] = 100.0 * MODE_ERROR
             errors["model_error_sag_percent"] = 100.0 * SAG_ERROR
     return figures | errors
+
+
+def width_effect(model: MechanismModel) -> dict[str, float]:
+    """Compute by how many per cent the restraint of the flexures by the plate's width raises the force, if at all.
+
+    It is left out of `mechanism_figures`, because it takes a second model, and sweeps compute many drawings.
+    """
+    if not model.mechanism.flexures or np.any(model.driven.rest_mm) or (plane := model.in_plane_stress) is None:
+        return {}
+    return {"width_effect_force_percent": 100.0 * (model.stiffness_n_mm / plane.stiffness_n_mm - 1.0)}
 
 
 def _of_drives(model: MechanismModel) -> dict[str, float]:

@@ -120,9 +120,7 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
     DataError, ModelError, UsageError
         If a corner of the grid is not a valid gripper, or the grid is too large.
     """
-    grid = list(product(*(variation.values for variation in variations)))
-    if len(grid) > _MOST_VARIANTS:
-        raise UsageError(f"--vary must give at most {_MOST_VARIANTS} variants, but gives {len(grid)}.")
+    grid = _grid(variations, _MOST_VARIANTS)
     for corner in product(*((min(v.values), max(v.values)) for v in variations)):
         check_outline(varied(gripper, variations, corner), f"the variant {_spelt(_named(variations, corner))}")
     rows = []
@@ -132,6 +130,14 @@ def sweep_answers(gripper: Gripper, variations: Sequence[Variation], theory: Hin
         drawn = varied(gripper, variations, values)
         rows.append(scaled(sweep_figures(StiffnessMatrixGripper(drawn, theory=theory)), by))
     return np.array(grid), np.array([list(row.values()) for row in rows], dtype=float)
+
+
+def _grid(variations: Sequence[Variation], most: int) -> list[tuple[float, ...]]:
+    """Every combination of the values of all variations."""
+    grid = list(product(*(variation.values for variation in variations)))
+    if len(grid) > most:
+        raise UsageError(f"--vary must give at most {most} drawings, but gives {len(grid)}.")
+    return grid
 
 
 def sweep_figures(model: DrawnGripper) -> dict[str, float]:
@@ -170,9 +176,7 @@ def mechanism_sweep_answers(
     DataError, ModelError, UsageError
         If a drawing of the grid is not a valid mechanism, or the grid is too large.
     """
-    grid = list(product(*(variation.values for variation in variations)))
-    if len(grid) > _MOST_MECHANISMS:
-        raise UsageError(f"--vary must give at most {_MOST_MECHANISMS} mechanisms, but gives {len(grid)}.")
+    grid = _grid(variations, _MOST_MECHANISMS)
     # Check the corners of the grid first, so that an invalid corner is reported before anything is computed.
     corners = list(product(*((v.values[0], v.values[-1]) for v in variations)))
     found = []

@@ -12,7 +12,7 @@ from skfem.helpers import ddot, eye, sym_grad, trace
 from fingervision.domain.errors import DataError, ModelError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
-from fingervision.models.mechanism import Mechanism
+from fingervision.models.mechanism import Face, Mechanism
 from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.mechanism_toml import read_mechanism
 
@@ -141,6 +141,25 @@ def test_a_drive_whose_body_is_held_is_refused_with_its_place(tmp_path: Path, ki
     if kind is not RigidBodies:
         assert ("(7.5, 10) mm" if not more else "(45, 10) mm") in str(refused.value)
         assert ("rail" if more else "fixed 1") in str(refused.value)
+
+
+@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame, RigidBodies])
+def test_a_drive_that_moves_everything_is_refused(tmp_path: Path, kind: type) -> None:
+    """A rail in place of the clamp: the drive pushes the whole mechanism along it."""
+    free = lever(tmp_path, "60, 60, 0, 10", 'across = "held"').drives[0]
+    drawn = lever(tmp_path, "60, 60, 0, 10", 'across = "held"')
+    railed = replace(drawn, fixed=(), slides=((drawn.fixed[0], "x"),), drives=(free,))
+    with pytest.raises(ModelError, match="without bending anything"):
+        _ = kind(railed).stiffness_n_mm
+
+
+@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame])
+def test_a_clamp_on_a_flexure_is_refused_with_its_place(tmp_path: Path, kind: type) -> None:
+    drawn = lever(tmp_path, "60, 60, 0, 10", ROD)
+    held = replace(drawn, fixed=(Face("jaws", (0.0, 13.0, 0.0, 10.0)),))
+    with pytest.raises(DataError, match=r"fixed face jaws of .* holds flexure leaf at \(1[12]\.?\d*, [45]\.5\) mm"):
+        kind(held)
+    kind(replace(drawn, fixed=(Face("jaws", (0.0, 10.0, 0.0, 10.0)),)))
 
 
 def test_drives_and_rails_that_agree_with_a_rigid_motion_are_computed(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from fingervision.cli.model import command
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_figures import mechanism_figures
+from fingervision.models.mechanism_figures import width_effect
 from fingervision.models.strips import necks_of, strips_of
 from fingervision.storage.mechanism_toml import read_mechanism
 
@@ -92,7 +92,7 @@ def test_the_width_of_a_cut_strip_makes_it_stiffer(tmp_path: Path) -> None:
     """By the plate's energy, a strip as wide as 0.4 of its length is some percent stiffer than a bar."""
     cut = drawn(tmp_path, CUT)
     stiffer = MechanismPlate(cut).stiffness_n_mm / MechanismPlate(cut, width_effect=False).stiffness_n_mm
-    named = mechanism_figures(MechanismPlate(cut))["width_effect_force_percent"]
+    named = width_effect(MechanismPlate(cut))["width_effect_force_percent"]
     assert named == pytest.approx(100.0 * (stiffer - 1.0))
     assert 1.02 < stiffer < 1.0 / (1.0 - 0.34**2)
 
