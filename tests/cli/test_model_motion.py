@@ -201,7 +201,7 @@ def test_a_mechanism_is_varied(tmp_path: Path) -> None:
     [
         ("lengths.x=1:2:3", "no number called lengths.x"),
         ("lengths.t=-1:2:3", "The variant lengths.t = -1 could not be computed"),
-        ("lengths.t=0.5:1:900", "must give at most 400 mechanisms, but gives 900"),
+        ("lengths.t=0.5:1:900", "must give at most 400 drawings, but gives 900"),
     ],
 )
 def test_a_mechanism_that_cannot_be_varied_so(tmp_path: Path, text: str, sentence: str) -> None:
