@@ -1,11 +1,9 @@
 """What every test shares: one hypothesis profile, so that the same commit always tests the same examples; Ctrl-C.
 
 With `-n`, each worker gets tests in a row and takes from others when it has none left, so that a fixture of a module is
-made once and not by every worker. With `-n auto`, there is one worker more than processors, because a fifth of the time
-of the tests is waiting: for emulated stages, cameras and browsers.
+made once and not by every worker.
 """
 
-import os
 import signal
 from typing import Any
 
@@ -27,9 +25,3 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     from xdist.scheduler import WorkStealingScheduling
 
     return WorkStealingScheduling(config, log) if config.getvalue("dist") == "load" else None
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Number of workers for `-n auto`."""
-    return (os.cpu_count() or 1) + 1
