@@ -29,6 +29,8 @@ _LEVER = 1e-6
 """Lever arms across a component that are shorter than this share of the face's extent do not prevent rotation."""
 _RIGIDLY = 1e-6
 """Largest difference between the motion that a drive prescribes and the nearest motion of a rigid body, over it."""
+_SLENDER = 5.0
+"""Square of a body's length over its area from which it bends as a beam, so that its own deformation is an answer."""
 
 
 def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm: float) -> Indices:
@@ -209,7 +211,7 @@ def pieces_of(plate: PlaneStressPlate, kept: NDArray[np.bool_] | slice = slice(N
 def _refuse_held_bodies(plate: PlaneStressPlate, mechanism: Mechanism, supports: Supports) -> None:
     """Refuse a drive whose body its supports and other drives hold: it deforms the body, and moves no flexure.
 
-    A body with a thin part that no flexure names may move by this part.
+    A slender body bends, and a body with a thin part that no flexure names may move by this part.
 
     Raises
     ------
@@ -238,6 +240,12 @@ def _refuse_held_bodies(plate: PlaneStressPlate, mechanism: Mechanism, supports:
         wanted, all_rows = np.concatenate(values), np.concatenate(rows)
         left = all_rows @ np.linalg.lstsq(all_rows, wanted, rcond=None)[0] - wanted
         if np.abs(left).max() <= _RIGIDLY * np.abs(wanted).max():
+            continue
+        (x1, x2, x3), (y1, y2, y3) = plate.nodes_mm[
+            :, plate.corner_triangles[:, piece[plate.corner_triangles[0]] == body]
+        ]
+        area = 0.5 * np.abs((x2 - x1) * (y3 - y1) - (x3 - x1) * (y2 - y1)).sum()
+        if np.hypot(*np.ptp(plate.nodes_mm[:, piece == body], axis=1)) ** 2 > _SLENDER * area:
             continue
         necks = [at for at, _ in necks_of(mechanism.region, flexures)]
         nearest = [np.argmin(np.hypot(*(plate.nodes_mm - np.array([at]).T))) for at in necks]

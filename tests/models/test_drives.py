@@ -271,3 +271,19 @@ def test_a_pin_must_lie_on_a_body(tmp_path: Path) -> None:
         lever(tmp_path, "40, 50, 10, 10", "pin_mm = [45, 5, 2]")
     with pytest.raises(ModelError, match="lies on flexure leaf"):
         MechanismFrame(pinned(tmp_path, 'pin_mm = [15, 5, 0.4]\nacross = "free"'))
+
+
+def test_a_body_that_bends_may_be_driven_beside_its_clamp(tmp_path: Path) -> None:
+    """A beam of 19.5 by 1 mm, clamped at one end and pushed at the other, is a cantilever with 3 E I / L^3."""
+    text = """
+plate_mm = 5.0
+material = { name = "m", youngs_modulus_mpa = 70000, poisson_ratio = 0.33, density_kg_m3 = 2700, yield_mpa = 300 }
+fixed = [{ box_mm = [0, 0, -1, 1] }]
+body = [{ box_mm = [0, 20.2, -0.5, 0.5] }, { box_mm = [21.8, 30, -3, 3] }]
+drive = { box_mm = [19, 20, 0.5, 0.5], direction = [0, 1], across = "free" }
+flexure = [{ name = "h", kind = "leaf", at_mm = [21, 0], axis_deg = 0, thickness_mm = 0.3, half_length_mm = 1 }]
+"""
+    (tmp_path / "beam.toml").write_text(text)
+    mechanism = read_mechanism(tmp_path / "beam.toml")
+    for kind in (MechanismFrame, MechanismPlate):
+        assert kind(mechanism).stiffness_n_mm == pytest.approx(3.0 * 70000.0 * 5.0 / 12.0 / 19.5**3, rel=0.02)
