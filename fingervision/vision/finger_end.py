@@ -28,8 +28,8 @@ BIWEIGHT_REACH, SIGMAS_IN_MEDIAN = 4.685, 1.4826
 LOOKS = ((100.0, 0.0), (10.0, 10.0), (1.5, 1.0), (1.0, 1.0))
 # Largest spread of the residuals, in units of the points' uncertainties.
 WORST_MISFIT = 1e3
-# Other starting values are tried if this number of points is rejected; the new fit is used if the sum of its weights is
-# larger by this factor, and its misfit at most this multiple.
+# Other starting values are tried if this number of points is left unexplained; the new fit is used if the sum of its
+# weights is larger by this factor, and its misfit at most this multiple.
 FEWEST_ASIDE, LEAST_GAIN, MORE_MISFIT = 3, 1.5, 1.3
 # Further starting radii (shares of the finger's width).
 OTHER_RADII = (0.1, 0.2, 0.35)
@@ -91,16 +91,20 @@ def fit_finger_end(points: OutlinePoints, start: Floats, origin: Floats, u_prior
 
 
 def fit_from_any_radius(points: OutlinePoints, start: Floats, origin: Floats, u_prior: Floats) -> FingerEnd:
-    """Repeat the fit from other starting radii of the corners if it rejects points.
+    """Repeat the fit from other starting radii of the corners if it leaves points unexplained.
 
-    With a wrong fillet radius, the points of the corner look like outliers (dust).
+    With a wrong fillet radius, the points of the corner look like outliers (dust). Points beside a corner without a
+    fillet do not count in the fit, but are explained if the fitted shape passes through them.
 
     The initial estimate of a radius assumes a right-angled corner, which a tapered finger does not have.
     """
     best = fit_finger_end(points, start, origin, u_prior)
-    if np.count_nonzero(best.robust <= 0.0) < FEWEST_ASIDE or best.misfit > NO_SHAPE:
-        return best
     inner, outer = best.parameters[[INNER_R, OUTER_R]]
+    aside = best.robust <= 0.0
+    if inner == outer == 0.0:
+        aside &= np.abs(best.residual) >= BIWEIGHT_REACH * best.misfit
+    if np.count_nonzero(aside) < FEWEST_ASIDE or best.misfit > NO_SHAPE:
+        return best
     width = abs(best.parameters[INNER_C] - best.parameters[OUTER_C])
     for radius in (0.0, *(share * width for share in OTHER_RADII), min(inner, outer), max(inner, outer)):
         again = start.copy()
