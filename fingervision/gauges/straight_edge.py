@@ -44,6 +44,9 @@ GUARD = 1.5
 MOST_TIMES = 4
 # Smallest contrast of a neighbouring edge, as a share of the measured edge's contrast, at which it is fitted too.
 LEAST_BESIDE = 0.1
+# At a smaller distance (in standard deviations of the blur), contrast and distance of two edges cannot be
+# distinguished: such a neighbour is a part of the edge itself, as its flank in a profile that leans against it.
+NEAREST_SIGMAS = 2.5
 # Largest distance between the fitted edge and the candidate, in addition to the blur.
 FARTHEST_FROM_CANDIDATE_PX = 3.0
 # A plateau is clipped if this share of its pixels is at the end of the scale. The flank is clipped as well if more than
@@ -132,6 +135,11 @@ class Axes:
 Floats = NDArray[np.float64]
 
 
+def apart_px(blur_px: float) -> float:
+    """Least distance at which two edges can be told apart."""
+    return NEAREST_SIGMAS * hypot(blur_px, 0.29)
+
+
 def fit_near(
     follower: "EdgeFollower", picture: Picture, chosen: list[StepCandidate], steps: list[StepCandidate]
 ) -> tuple[list[EdgeFound], float] | NotFound:
@@ -155,13 +163,12 @@ def fit_near(
     """
     blur = follower.known.blur_px if follower.known is not None else 1.2
     reach = reach_px(blur)
-    least = LEAST_BESIDE * max(abs(step.contrast) for step in chosen)
+    least, nearest = LEAST_BESIDE * max(abs(step.contrast) for step in chosen), apart_px(blur)
     beside = [
         step
         for step in steps
-        if step not in chosen
-        and abs(step.contrast) >= least
-        and min(abs(step.position_px - own.position_px) for own in chosen) < reach + 2.0
+        if abs(step.contrast) >= least
+        and nearest <= min(abs(step.position_px - own.position_px) for own in chosen) < reach + 2.0
     ]
     beside = sorted(beside, key=lambda step: -abs(step.contrast))[:2]
     starts = tuple(EdgeStart(step.position_px, follower.slope, step.contrast) for step in (*chosen, *beside))

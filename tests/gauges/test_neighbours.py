@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.gauges.drawn import Texture, bar, cross, disc, drawn, seen
+from tests.gauges.drawn import Texture, bar, cross, disc, drawn, half_plane, seen
 from tests.gauges.followed import followed, gauges_of
 
 SHAPE, APART = (64, 110), 26.0
@@ -45,3 +45,15 @@ def test_no_gauge_jumps_to_a_neighbour_while_its_own_thing_is_covered(tmp_path: 
     assert value[2:7] == [None] * 5
     assert value[1] is not None
     assert value[7] == pytest.approx(value[1], abs=0.3)
+
+
+def test_the_flank_of_an_edge_that_leans_is_no_neighbour(tmp_path: Path) -> None:
+    """The inner faces of two fingers that turn against each other, 14.5 px apart in a picture that is turned too."""
+    rng = np.random.default_rng(35)
+    gauge = 'kind="pair"\nx_px=32\ny_px=32\ndirection_deg=-178.8\nlength_px=24\ndistance_px=14.5\npolarity="dark"'
+    for shift in np.linspace(0.0, 0.9, 10):
+        faces = [half_plane(32 + shift + side * 7.25, 32, normal) for side, normal in ((1, 0.035), (-1, np.pi + 0.007))]
+        light = drawn((64, 64), 50, [(face, 190) for face in faces])
+        (row,) = followed(gauges_of(tmp_path, gauge), [seen(light, 1.5, rng)])
+        assert row[0].quantities, row[0].words
+        assert row[0].quantities[0].in_pixels()[0] == pytest.approx(14.5, abs=0.05)

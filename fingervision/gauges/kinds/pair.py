@@ -1,7 +1,7 @@
 """Distance of two parallel edges along a direction: the width of a bar, slot or link."""
 
 from dataclasses import dataclass
-from math import hypot, radians, sqrt
+from math import radians, sqrt
 from typing import Annotated
 
 from fingervision.domain.field import Field
@@ -9,15 +9,12 @@ from fingervision.gauges.common_keys import LONGEST_PX, REACH_PX, Across, Length
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
-from fingervision.gauges.straight_edge import Axes, EdgeFollower, EdgeFound, NotFound, fit_near
+from fingervision.gauges.straight_edge import Axes, EdgeFollower, EdgeFound, NotFound, apart_px, fit_near
 from fingervision.vision.edge_search import StepCandidate
 from fingervision.vision.straight_edge_fit import reach_px
 
 QUANTITIES = (("distance", "length"),)
 POLARITIES = {"any": (0, 0), "light": (1, -1), "dark": (-1, 1), "rising": (1, 1), "falling": (-1, -1)}
-# At a smaller distance (in standard deviations of the blur), contrast and distance of two edges cannot be
-# distinguished.
-NEAREST_SIGMAS = 2.5
 # Largest search distance of each edge in the first frame, as a share of the distance between the edges.
 NEAR_OWN = 0.4
 # Candidates from the searches of both edges that are nearer than this are regarded as the same edge.
@@ -108,7 +105,7 @@ class FollowedPair:
         (left, beside), (right, beside_right) = seen
         apart = second.at_px + right.position_px - first.at_px - left.position_px
         blur = max((edge.known.blur_px for edge in self._edges if edge.known is not None), default=1.2)
-        if apart < NEAREST_SIGMAS * hypot(blur, 0.29):
+        if apart < apart_px(blur):
             same = abs(apart) < SAME_PX
             return NotFound(GaugeStatus.AMBIGUOUS if same else GaugeStatus.TOUCHING)
         if apart > 2.0 * reach_px(blur):
@@ -121,8 +118,7 @@ class FollowedPair:
             return (fits[0], fits[1]), 0.0
         # Edges that are near each other are fitted together, because each edge affects the window of its neighbour.
         moved = StepCandidate(right.position_px + second.at_px - first.at_px, right.contrast)
-        near = [step for step in beside if abs(step.position_px - moved.position_px) > SAME_PX]
-        both = fit_near(first, picture, [left, moved], near)
+        both = fit_near(first, picture, [left, moved], beside)
         if isinstance(both, NotFound):
             return both
         return (both[0][0], both[0][1]), both[1]
