@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
-from fingervision.models.layers import Joint, pieces_of, points_in
-from fingervision.models.planar_region import Loop, PlanarRegion
+from fingervision.models.layers import Joint, Sheet, pieces_of, points_in
+from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Shape, box, crossings
 from fingervision.models.width_effect import force_uncertainty
 
@@ -329,13 +329,13 @@ def check_mechanism(mechanism: Mechanism, region: PlanarRegion) -> None:
         pieces = pieces_of(by_layer, mechanism.joints)
     except FingervisionError as error:
         raise DataError(f"In {name}: {error}") from error
-    outer = [piece[0].part.outline for piece in pieces]
-    if not outer:
+    if not pieces:
         raise DataError(f"The cuts of {name} must leave something of its bodies, but leave nothing; make them smaller.")
-    if len(outer) != 1:
+    if len(pieces) != 1:
+        joined = "let a body with several in_layers join the layers" if mechanism.layers else "let no cut separate them"
         raise DataError(
-            f"The bodies of {name} must form one connected piece, but form {len(outer)}: {_pieces(mechanism, outer)}; "
-            "let bodies and flexures overlap, and let no cut separate them."
+            f"The bodies of {name} must form one connected piece, but form {len(pieces)}: "
+            f"{_pieces(mechanism, pieces)}; let bodies and flexures overlap, and {joined}."
         )
     numbers = mechanism.layers or ((1,),) * len(mechanism.bodies)
     for flexure in mechanism.flexures:
@@ -450,21 +450,24 @@ def _check_points(mechanism: Mechanism, region: PlanarRegion, by_layer: Mapping[
             raise DataError(f"face {face.name} of {name} must have a box_mm with finite limits.")
 
 
-def _pieces(mechanism: Mechanism, outer: Sequence[Loop]) -> str:
+def _pieces(mechanism: Mechanism, pieces: Sequence[Sequence[Sheet]]) -> str:
     """Where each piece of a drawing lies, and the names of the bodies in it."""
     found = []
     names = [*mechanism.body_names, *[""] * len(mechanism.bodies)]
-    for loop in outer[:_MOST_NAMED]:
-        points = np.concatenate([curve.at(np.array([curve.t0, curve.t1])) for curve in loop.curves], axis=1)
+    layers = mechanism.layers or ((1,),) * len(mechanism.bodies)
+    for piece in pieces[:_MOST_NAMED]:
+        curves, own = piece[0].part.outline.curves, [sheet.layer for sheet in piece]
+        points = np.concatenate([curve.at(np.array([curve.t0, curve.t1])) for curve in curves], axis=1)
         (x0, y0), (x1, y1) = points.min(axis=1), points.max(axis=1)
         inside = dict.fromkeys(
             name
-            for (added, shape), name in zip(mechanism.bodies, names, strict=False)
-            if added and name and shape.holds(points).any()
+            for (added, shape), name, at in zip(mechanism.bodies, names, layers, strict=False)
+            if added and name and not set(at).isdisjoint(own) and shape.holds(points).any()
         )
+        where = f" in layer {' and '.join(map(str, own))}" if mechanism.layers else ""
         of = f" ({', '.join(inside)})" if inside else ""
-        found.append(f"one at x {x0:.4g} to {x1:.4g}, y {y0:.4g} to {y1:.4g} mm{of}")
-    return ", ".join(found) + (", ..." if len(outer) > _MOST_NAMED else "")
+        found.append(f"one{where} at x {x0:.4g} to {x1:.4g}, y {y0:.4g} to {y1:.4g} mm{of}")
+    return ", ".join(found) + (", ..." if len(pieces) > _MOST_NAMED else "")
 
 
 def _is_hole(area_mm2: float, flexure: Flexure) -> bool:

@@ -366,6 +366,11 @@ def _refuse_same_names(top: Section, key: str) -> None:
     places: dict[str, int] = {}
     for place, section in enumerate(top.tables(key), 1):
         name = section.values.get("name", f"{key} {place}")
+        if not name.isprintable():
+            raise DataError(
+                f"Every name of a [[{key}]] of {top.path} must be one line of printable letters, because it heads "
+                f"columns, but that of number {place} is {name!r}; write it in one line."
+            )
         if name in places:
             raise DataError(
                 f"Every [[{key}]] of {top.path} must have a name of its own, but numbers {places[name]} and {place} "

@@ -3,6 +3,7 @@
 import codecs
 import errno
 import json
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path, PurePath
@@ -88,6 +89,11 @@ def parsed(parser: Callable[[str], Any], text: str) -> Any:
         return parser(text)
     except RecursionError:
         raise ValueError("its brackets are nested too deeply") from None
+    except tomllib.TOMLDecodeError as error:
+        # The parser names a table by a tuple of its keys: ('drive', 'body') is [drive.body].
+        keys = r"\(('[^']*'(?:, '[^']*')*),?\)"
+        words = re.sub(keys, lambda found: "[" + found[1].replace("', '", ".").strip("'") + "]", str(error))
+        raise ValueError(words) from None
 
 
 def _json(text: str) -> Any:

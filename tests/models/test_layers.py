@@ -150,7 +150,10 @@ WRONG = [
     ("[[body]]\nname = 'x'\nin_layers = [1, 1]\nbox_mm = [0, 1, 0, 1]\n", "[1, 1]"),
     ("[[body]]\nname = 'x'\nin_layers = [0]\nbox_mm = [0, 1, 0, 1]\n", "[0]"),
     ("[[body]]\nname = 'x'\nin_layers = [3]\nbox_mm = [100, 101, 0, 1]\n", "x 100 to 101"),
-    ("[[body]]\nname = 'x'\nin_layers = [3]\nbox_mm = [-30, 30, 41, 42]\n", "form 2"),
+    (
+        "[[body]]\nname = 'x'\nin_layers = [3]\nbox_mm = [-30, 30, 41, 42]\n",
+        "in layer 3 at x -30 to 30, y 41 to 42 mm (x); ",
+    ),
 ]
 
 

@@ -15,7 +15,7 @@ from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_figures import response_figures
 from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.drawing_numbers import number
-from fingervision.storage.mechanism_toml import is_mechanism, mechanism_from_tables, read_mechanism
+from fingervision.storage.mechanism_toml import is_mechanism, mechanism_from_tables, read_drawing, read_mechanism
 
 ROOT = Path(__file__).parents[2]
 DRAWN = ROOT / "fingervision" / "models" / "mechanisms"
@@ -58,6 +58,7 @@ WRONG = [
     ('name = "ground"\nbox_mm', 'name = "ground"\nwide = 3\nbox_mm', "ground.wide in m.toml is not known"),
     ('turns = "held"', 'turns = "maybe"', "drive.turns"),
     ('name = "right"', 'name = "left"', "numbers 1 and 2 are both called left"),
+    ('name = "right"', 'name = "ri\\nght"', "must be one line of printable letters"),
     (
         'box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "leaf", "leaf + block"]',
         "box_mm = [100, 120, 100, 120]",
@@ -77,6 +78,12 @@ UNHELD = [
     ('box_mm = ["-apart / 2 - 5", "-apart / 2 - 5", "leaf", "leaf + block"]',
      'box_mm = ["-apart / 2 - 5", "apart / 2 + 5", "-block", "-block"]', "is fixed too"),
 ]  # fmt: skip
+
+
+def test_a_table_that_stands_twice_is_named_as_it_is_written(tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_text(f"{STAGE}[drive]\nname = 'a'\n", encoding="utf-8")
+    with pytest.raises(DataError, match=r"Cannot declare \[drive\] twice \(at line \d+"):
+        read_drawing(tmp_path / "m.toml")
 
 
 @pytest.mark.parametrize(("old", "new", "named"), WRONG, ids=[str(i) for i in range(len(WRONG))])
