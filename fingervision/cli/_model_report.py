@@ -92,9 +92,14 @@ def say_drawing(mechanism: Mechanism, figures: Mapping[str, float]) -> None:
         )
     for drive in mechanism.drives:
         click.echo(drive.words)
-    if (percent := figures.get("width_effect_force_percent")) is not None:
+    say_width(mechanism.plate_mm, figures)
+
+
+def say_width(plate_mm: float, figures: Mapping[str, float | None]) -> None:
+    """Print by how much the plate's width raises the force."""
+    if percent := figures.get("width_effect_force_percent"):
         click.echo(
-            f"The plate's width of {mechanism.plate_mm:g} mm restrains the flexures, which makes the force "
+            f"The plate's width of {plate_mm:g} mm restrains the flexures, which makes the force "
             f"{percent:.2g} % higher than beam formulas with Young's modulus (plane stress)."
         )
 

@@ -232,12 +232,12 @@ def command(
 
     from fingervision.cli._model_grip import part_asked, write_grip
     from fingervision.cli._model_motion import motion_asked, move
-    from fingervision.cli._model_report import say_refusals, say_what_limits
+    from fingervision.cli._model_report import say_refusals, say_what_limits, say_width
     from fingervision.domain.errors import UsageError
     from fingervision.interface.prediction import figures_csv, figures_text, predict_gripper, refuse_beams
     from fingervision.models.answer_figures import Physics
     from fingervision.models.hinge_correction import HingeTheory
-    from fingervision.models.kinds import kinds
+    from fingervision.models.kinds import by_trust, kinds
     from fingervision.storage.gripper_toml import read_gripper
     from fingervision.storage.mechanism_toml import is_mechanism
     from fingervision.storage.out_folder import began_in, finish_in, make_out_folder
@@ -313,6 +313,8 @@ def command(
     _draw(gripper_toml.stem, gripper, found, out, mesh=mesh)
     (out / "models.csv").write_text(figures_csv(rows), encoding="utf-8")
     click.echo(json.dumps(rows, indent=2) if as_json else figures_text("", rows))
+    if not as_json:
+        say_width(gripper.body.plate_mm, rows[by_trust(rows)[0]])
     if uncertain:
         from fingervision.cli._model_sweep import write_uncertainty
         from fingervision.models.uncertainty import gripper_uncertainty

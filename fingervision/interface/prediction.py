@@ -23,6 +23,7 @@ from fingervision.interface.argument_checks import one_of, path_of, speaks_pytho
 from fingervision.models.answer_figures import LINEAR, ModelFigures, Physics
 from fingervision.models.elastic_mechanism import MechanismState
 from fingervision.models.gripper_figures import gripper_figures, unit_of
+from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model, disagreements, kinds, small_displacements_alone
 from fingervision.models.mechanism import Mechanism
@@ -277,6 +278,7 @@ def predict_gripper(
                 given = _with_rows_between(given, figures)
             answer = built.respond(given)
             row = gripper_figures(gripper, built, given, figures)
+            row |= width_effect(built.elastic) if isinstance(built, DrawnGripper) else {}
         except FingervisionError as error:
             if kind != ALL:
                 raise

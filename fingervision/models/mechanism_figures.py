@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import ModelError
-from fingervision.models.elastic_mechanism import named_by_drive
+from fingervision.models.elastic_mechanism import ElasticMechanism, named_by_drive
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.grip import Part
 from fingervision.models.lumped import MechanismFrame
@@ -275,7 +275,7 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     return figures | errors
 
 
-def width_effect(model: MechanismModel) -> dict[str, float]:
+def width_effect(model: ElasticMechanism) -> dict[str, float]:
     """Compute by how many per cent the restraint of the flexures by the plate's width raises the force, if at all.
 
     It is left out of `mechanism_figures`, because it takes a second model, and sweeps compute many drawings.

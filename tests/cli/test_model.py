@@ -242,3 +242,6 @@ def test_endurance_and_warmth_where_the_material_states_them(tmp_path: Path) -> 
     expected = 1e3 * (by_mm / (1 - 0.5 * by_mm / 48) / 30) ** (np.log(1e3) / np.log(12 / 30))
     assert float(row["endurance_cycles"]) == pytest.approx(expected, rel=0.02)
     assert row["gap_per_kelvin_mm"] == ""
+    # Three-dimensional elements: 2.06 N/mm, in plane stress 2.0014 N/mm.
+    assert float(row["width_effect_force_percent"]) == pytest.approx(2.9, abs=0.5)
+    assert "The plate's width of 3 mm restrains the flexures" in output
