@@ -5,7 +5,7 @@ fitted to all pixels near the edge, I = a + b Phi(-(s - d) / sigma_e), with s th
 normal and d the offset of the edge. The picture is not resampled, so that the sub-pixel phase causes no bias.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import ceil
 from typing import Protocol
 
@@ -47,11 +47,15 @@ class Chunks:
         Outward unit normals.
     half_length : float
         Half the length of a stretch.
+    bends : ndarray of float, shape (m, k)
+        Outward displacement of every stretch by one standard deviation of each of the k ways in which the body bends
+        beside its rigid motion.
     """
 
     middles: Array
     normals: Array
     half_length: float
+    bends: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def moved(self, shift: Array, angle: float, about: Array) -> "Chunks":
         """Move the chunks rigidly: rotation about a point, then a shift."""

@@ -268,7 +268,9 @@ def capture_rigid(
         scale = 0.5**level
         # The centre of a pixel of the halved picture lies between the centres of two original pixels.
         offset = 0.5 * scale - 0.5
-        small = Chunks(chunks.middles * scale + offset, chunks.normals, max(chunks.half_length * scale, 2.0))
+        small = Chunks(
+            chunks.middles * scale + offset, chunks.normals, max(chunks.half_length * scale, 2.0), chunks.bends * scale
+        )
         coarse = replace(view, flat=None if view.flat is None else _Halved(view.flat, scale, offset), outward_px=0.0)
         begin = (shift * scale, angle)
         rough = fit_rigid(pyramid[level - 1], small, about * scale + offset, body_is_dark, begin, coarse)
@@ -320,9 +322,11 @@ def _rigid(
         chunks.middles[:, used], chunks.normals[:, used], edges.blur[used], edges.u_blur[used], edges.stretch[used]
     )
     # An edge seen farther out is one offset of all chunks; a body that is larger than drawn moves each by its distance;
-    # a doubtful side has an offset of its own. Of each of these it is known how large it may be.
+    # a doubtful side has an offset of its own. Of each of these it is known how large it may be, and so it is of how a
+    # body bends, in each frame anew.
     shared = np.stack([np.ones_like(nx), nx * arm[0] + ny * arm[1]], axis=1)
-    columns = np.hstack([rigid, shared * (view.u_outward_px, view.u_size), doubtful])
+    bends = chunks.bends[used] if chunks.bends.size else np.zeros((nx.size, 0))
+    columns = np.hstack([rigid, shared * (view.u_outward_px, view.u_size), doubtful, bends])
     prior = np.diag([0.0] * 3 + [1.0] * (columns.shape[1] - 3))
     offset, sd = edges.offset[used], np.sqrt(edges.variance[used])
     weight = np.ones(offset.size)
@@ -351,9 +355,11 @@ def _rigid(
     inverse = np.linalg.inv(normal)
     size = _size_error(np.hstack([rigid, shared]), offset, sd)
     noise = inverse[:3] @ (normal - prior) @ inverse[:, :3]
-    by_shadows = inverse[:3, 5:] @ inverse[5:, :3]
+    bent = columns.shape[1] - bends.shape[1]
+    by_shadows = inverse[:3, 5:bent] @ inverse[5:bent, :3]
+    by_bends = inverse[:3, bent:] @ inverse[bent:, :3]
     by_shared = inverse[:3] @ (columns.T @ (w[:, None] * shared))
-    return move[:3], spread * noise, by_shared, by_shadows, size
+    return move[:3], spread * noise + by_bends, by_shared, by_shadows, size
 
 
 def _size_error(columns: Array, offset: Array, sd: Array) -> tuple[float, float]:

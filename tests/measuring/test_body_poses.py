@@ -19,7 +19,7 @@ from fingervision.models.finite_element import MechanismPlate
 from fingervision.rendering import Camera, Patch, Scene, render
 from fingervision.rendering.polygon import polygon
 from fingervision.storage.bodies_csv import add_channels, write_bodies
-from fingervision.storage.mechanism_toml import mechanism_from_tables
+from fingervision.storage.mechanism_toml import mechanism_from_tables, read_mechanism
 from tests.deformed_plate import deformed_outlines
 from tests.diagnosis.lever_drawing import TABLES
 
@@ -33,13 +33,14 @@ def plate() -> MechanismPlate:
 
 
 def frame(
-    plate: MechanismPlate, u: float, number: int, place: Placement = PLACE, cover: tuple[Patch, ...] = ()
-) -> Frame:
+    plate: MechanismPlate, u: float, number: int, place: Placement = PLACE, cover: tuple[Patch, ...] = (),
+    size_px: tuple[int, int] = (WIDTH, HEIGHT),
+) -> Frame:  # fmt: skip
     rng = np.random.default_rng(number)
     moved = u * plate.driven.unit_displacement
     nodes = plate.plate.nodes_mm + np.stack([moved[plate.plate.x_dofs], moved[plate.plate.y_dofs]])
     outlines = deformed_outlines(plate.plate.outline_edges, place.to_px(nodes))
-    scene = Scene(width_px=WIDTH, height_px=HEIGHT, before=(Patch(outlines, 50.0), *cover))
+    scene = Scene(width_px=size_px[0], height_px=size_px[1], before=(Patch(outlines, 50.0), *cover))
     return Frame(render(scene, Camera(blur_px=0.9, noise_grey=2.0), rng), number, 0.1 * number)
 
 
@@ -49,6 +50,18 @@ def points(place: Placement, *at: tuple[float, float]) -> tuple[GivenPoint, ...]
         x, y = place.to_px(np.array([[x_mm], [y_mm]]))[:, 0]
         found.append(GivenPoint(round(float(x)) + 1.0, round(float(y)) - 1.0, x_mm, y_mm))
     return tuple(found)
+
+
+def test_the_pose_of_a_body_that_bends_is_that_of_its_area() -> None:
+    """A stubby lever between its pivot, a spring and the drive: its edges alone are turned otherwise than its area."""
+    drawing = Path(__file__).parents[1] / "benchmarks" / "mechanisms" / "films" / "lever_jaw.toml"
+    lever, scale, u = MechanismPlate(read_mechanism(drawing)), 13.0, 0.15
+    place = Placement(scale, np.array([186.3, 628.6]), 0.015, False)
+    frames = [frame(lever, at, number, place, size_px=(560, 790)) for number, at in enumerate((0.0, u))]
+    rest, seen = (each.poses["lever"] for each in BodyTracker(lever.mechanism, BareScale(scale)).poses(frames))
+    u_mrad = float(np.hypot(*(np.sqrt(pose.random[2, 2]) for pose in (rest, seen))))
+    assert u_mrad < 0.03
+    assert seen.angle_mrad - rest.angle_mrad == pytest.approx(lever.state(u).bodies["lever"].angle_mrad, abs=3 * u_mrad)
 
 
 @pytest.mark.slow
