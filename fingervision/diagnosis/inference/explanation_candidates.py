@@ -44,16 +44,17 @@ def best_each(explanations: Iterable[Explanation]) -> list[Explanation]:
     return list(found.values())
 
 
-def single_effects(problem: Problem, atoms: Signatures, iterations: int, begins: int = BEGINS) -> list[Explanation]:
-    """Fit each effect alone, from its most promising signatures; best first."""
+def single_effects(
+    problem: Problem, atoms: Signatures, iterations: int, begins: int = BEGINS, most: int | None = None
+) -> list[Explanation]:
+    """Fit each effect alone, from its most promising signatures, or the `most` promising effects only; best first."""
     nothing = problem.nothing()
     gain, coefficient = atoms.gains(nothing, tangents(problem, nothing))
     owner = np.array(atoms.names)
     found = []
-    for name in problem.effects:
+    promising = dict.fromkeys(owner[np.argsort(-gain, kind="stable")].tolist())
+    for name in list(promising)[:most]:
         mine = np.flatnonzero(owner == name)
-        if not mine.size:
-            continue
         mine = mine[np.argsort(-gain[mine])]
         starts = [atoms.begin(k, coefficient[k]) for k in mine[:begins]]
         listed = [parameter for _, parameter in problem.parameters((name,)) if parameter.run is None]

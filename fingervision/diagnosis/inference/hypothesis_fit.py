@@ -221,6 +221,10 @@ class _JointSquares:
             out[name][parameter.name] = float(value)
         return {name: self.problem.effects[name].within(values) for name, values in out.items()}
 
+    def point(self, values: Mapping[str, Mapping[str, float]]) -> Array:
+        """Vector of the parameters, shape (p,), from their values by name; a start state without a value is zero."""
+        return np.array([values[name].get(one.name, one.neutral or 0.0) for name, one in self.listed])
+
     def residual(self, x: Array) -> Array:
         """Whitened target minus prediction."""
         return self.aim - self.problem.whitener.one(self._predicted(x))
@@ -246,13 +250,14 @@ class _JointSquares:
     def linearised(self, x: Array, residual: Array) -> tuple[Array, Array]:
         """Linearise the prediction by finite differences that stay within the bounds."""
         offsets = self.problem.offsets
-        jacobian = self.problem.whitener.columns(self._derivatives(x))[0]
+        jacobian = self.problem.whitener.columns(self.derivatives(x))[0]
         shared = offsets.design.T @ jacobian
         normal = jacobian.T @ jacobian - shared.T @ self.metric @ shared
         pull = jacobian.T @ residual - shared.T @ self.metric @ (offsets.design.T @ residual)
         return normal, pull
 
-    def _derivatives(self, x: Array) -> Array:
+    def derivatives(self, x: Array) -> Array:
+        """Derivatives of the prediction before whitening, shape (m, p)."""
         problem = self.problem
         lower, upper = _bounds(self.listed)
         base = self._predicted(x)
@@ -300,9 +305,8 @@ def fit(
     order = tuple(name for name in problem.effects if name in names)
     listed = problem.parameters(order)
     lower, upper = _bounds(listed)
-    x = np.array([start[name].get(parameter.name, parameter.neutral or 0.0) for name, parameter in listed])
     squares = _JointSquares(problem, aim, order, listed, np.zeros((0, 0)), sigma_mm)
-    found = descend(squares, np.clip(x, lower, upper), lower, upper, iterations)
+    found = descend(squares, np.clip(squares.point(start), lower, upper), lower, upper, iterations)
     found = _scanned(found, lower, upper, thorough=iterations >= MANY_STEPS)
     spread, penalty, cost = sigma_mm, 0.0, found.cost
     if spread is None:
@@ -325,6 +329,13 @@ def fit(
         starts_price=float(np.sum(np.minimum(prices, np.log(problem.rows)))),
         rows=problem.rows,
     )
+
+
+def derivatives(problem: Problem, explanation: Explanation) -> Array:
+    """Derivatives of the prediction with respect to an explanation's parameters, before whitening; shape (m, p)."""
+    listed = problem.parameters(explanation.names)
+    squares = _JointSquares(problem, problem.measured, explanation.names, listed, np.zeros((0, 0)), None)
+    return squares.derivatives(squares.point(explanation.values))
 
 
 def refit(problem: Problem, explanation: Explanation) -> Explanation:

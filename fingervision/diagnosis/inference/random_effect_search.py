@@ -16,7 +16,7 @@ from fingervision.diagnosis.inference.map_identifiability import (
 )
 from fingervision.diagnosis.inference.position_map import NAME, PositionMap, likeliest_map, why_no_map
 from fingervision.diagnosis.inference.random_effect import FEWEST_RUNS, LEAST_GAIN, RunGains, likeliest_gains
-from fingervision.diagnosis.inference.search import Look, Searched
+from fingervision.diagnosis.inference.search import Look, Searched, problem_of
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.observations import Observations
@@ -45,9 +45,12 @@ def beside_gains(state: Searched, look: Look) -> Searched:
     explained = found.unknown is None and standing_of(state.data, found).is_little
     if explained:
         likelier = _likelier(found, likeliest_gains, -LEAST_GAIN) if len(found.best.names) > 1 else None
-        if likelier is None:
+        known, gains = likelier or (None, None)
+        if known is None or gains is None:
             return state
-        known, gains = likelier
+        seen = replace(state.data, run_gains=gains)
+        if not standing_of(seen, replace(found, best=known, problem=problem_of(seen, known))).is_little:
+            return state
     else:
         tried = [likeliest_gains(found.problem, one) for one in (found.best, *found.singles[:BESIDE])]
         gains, gain = max(tried, key=lambda one: one[1])
@@ -90,6 +93,9 @@ def beside_map(state: Searched, look: Look) -> Searched:
         if likelier is None:
             return state
         known, first = likelier
+        if known is not None and set(found.best.names) <= set(known.names):
+            # The map replaces none of the effects: it only describes the inexactness of their formulas.
+            return state
     else:
         first, gain = likeliest_map(found.problem, found.best)
         if gain < LEAST_GAIN and found.best.names:

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import START_VARIANCE, Explanation, Point, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import refit
+from fingervision.diagnosis.inference.hypothesis_fit import derivatives, refit
 from fingervision.diagnosis.inference.posterior import settled
-from fingervision.diagnosis.inference.signatures import derivatives
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.channel_noises import (
     CORRELATIONS,

@@ -25,7 +25,7 @@ from fingervision.diagnosis.inference.hypothesis_fit import fit, refit
 from fingervision.diagnosis.inference.model_adequacy import VERY_STRONG, imitated, remaining_structure
 from fingervision.diagnosis.inference.random_effect import FORM, PATH, estimated_coefficients
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
-from fingervision.diagnosis.inference.search_state import ROUGH, Findings, SearchState, beyond_form, noise_known
+from fingervision.diagnosis.inference.search_state import NOISY, ROUGH, Findings, SearchState, beyond_form, noise_known
 from fingervision.diagnosis.inference.verdict import STANDING_SHARE, standing_of
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Flags
@@ -103,7 +103,9 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
     pairs = state.with_known(extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress), 2)
     if pairs and _leaves_structure(state, pairs[0]):
         pairs = best_each([*pairs, *pairs_in_time(problem, state.atoms, singles)])
-    pairs = [e for e in swapped(problem, state.atoms, pairs) if not follows_the_input(problem, e, singles[0])]
+    if _leaves_structure(state, singles[0]):
+        pairs = swapped(problem, state.atoms, pairs)
+    pairs = [e for e in pairs if not follows_the_input(problem, e, singles[0])]
     state = replace(state, pairs=pairs)
     # Pairs are compared with the best single effect: compared with a simpler formula, a second effect would gain what a
     # richer formula has already gained.
@@ -112,9 +114,10 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
 
 
 def _leaves_structure(state: SearchState, explanation: Explanation) -> bool:
-    """Whether an explanation leaves more than a share of the disagreement that would be named, in chi-square."""
+    """Whether an explanation leaves more than noise, and more than the share that it may leave, in chi-square."""
     rows = state.problem.rows
-    return explanation.score - rows > STANDING_SHARE**2 * max(0.0, state.nothing.score - rows)
+    left = explanation.score - rows
+    return bool(left > max(NOISY * rows**0.5, STANDING_SHARE**2 * (state.nothing.score - rows)))
 
 
 def _three_effects(state: SearchState, progress: Progress) -> SearchState:

@@ -20,6 +20,8 @@ standard deviations sqrt(2 n)."""
 ROUGH = 2
 """Number of starts, and of explanations refitted thoroughly, in a first search whose only purpose is to estimate the
 noise. If its fit is poor, the chi-square of the result shows this, and the search is repeated (`searched.QUIET`)."""
+ROUGH_EFFECTS = 6
+"""Number of effects that are fitted in it, in the order of their signatures' gain."""
 SHORT = 100
 """Number of samples below which the noise is estimated with single effects only."""
 
@@ -125,7 +127,7 @@ def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: 
     problem = problem_beside(None)
     changed = changes(problem)
     atoms = changed.whitened(problem)
-    rough = single_effects(problem, atoms, 4, ROUGH)
+    rough = single_effects(problem, atoms, 4, ROUGH, ROUGH_EFFECTS)
     # A pair that is fitted to few samples absorbs their noise, so that the noise would be underestimated.
     many = problem.chain.history.input_mm.size >= SHORT
     pairs = extended(problem, atoms, rough[:3], 16, lambda _: None, scanned=1, refined=ROUGH) if many else []

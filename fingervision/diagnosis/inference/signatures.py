@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import derivatives
 from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
 from fingervision.domain.effect import Array, Flags, History, start_key
 
@@ -141,19 +142,6 @@ def start_patterns(history: History) -> tuple[dict[str, float], ...]:
         moving = moves[np.abs(moves) > START_MOVES * history.input_span_mm]
         first.append(float(np.sign(moving[0])) if moving.size else 1.0)
     return tuple({start_key(run): end * way for run, way in enumerate(first)} for end in (0.0, -1.0, 1.0))
-
-
-def derivatives(problem: Problem, explanation: Explanation) -> Array:
-    """Derivatives of the prediction with respect to an explanation's parameters, before whitening; shape (m, p)."""
-    base = problem.chain.stacked(explanation.values)
-    columns = [np.zeros((base.size, 0))]
-    for name, parameter in problem.parameters(explanation.names):
-        value = explanation.values[name].get(parameter.name, 0.0)
-        step = 1e-3 * max(abs(value), 1e-3 * min(parameter.upper - parameter.lower, 1.0))
-        step = step if value + step <= parameter.upper else -step
-        moved = {**explanation.values, name: {**explanation.values[name], parameter.name: value + step}}
-        columns.append((problem.chain.stacked(moved) - base)[:, None] / step)
-    return np.hstack(columns)
 
 
 def tangents(problem: Problem, explanation: Explanation) -> Array:

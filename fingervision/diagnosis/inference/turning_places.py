@@ -6,11 +6,10 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import fit, refit
+from fingervision.diagnosis.inference.hypothesis_fit import derivatives, fit, refit
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.search import Look, Searched, problem_of, refitted
 from fingervision.diagnosis.inference.search_state import Findings
-from fingervision.diagnosis.inference.signatures import derivatives
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
