@@ -77,6 +77,56 @@ class Placement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Bending:
+    """How the bodies of a mechanism bend as it is driven, beside their rigid motions.
+
+    Without it, a body's pose would be that of the edges that happen to be seen, and a bent edge would count as a wrong
+    one: the pose of a stubby lever was off by 0.5 mrad, fifty times its uncertainty.
+
+    Parameters
+    ----------
+    model : MechanismFrame
+        Elastic model of the drawing.
+    moved : ndarray of float, shape (unknowns, k)
+        Its small displacements by each drive, at the input at which its flexures yield.
+    poses : tuple of mapping of str to BodyPose
+        Poses of the moving bodies in each of them; those of fixed bodies are zero.
+    """
+
+    model: MechanismFrame
+    moved: Array
+    poses: tuple[Mapping[str, BodyPose], ...]
+
+    def of(self, body: LinkBody, chunks: Chunks, place: Placement) -> Chunks:
+        """Add to the chunks of a body how each moves outwards as the body bends."""
+        at_mm = place.axes.T @ (chunks.middles - place.origin_px[:, None]) / place.px_per_mm
+        outward = place.axes.T @ chunks.normals
+        inside_mm = at_mm - BESIDE * self.model.mechanism.region.size_mm * outward
+        shape = (at_mm.shape[1], 2, self.moved.shape[1])
+        moved_mm = np.reshape(
+            [self.model.motion_mm(self.moved, (x, y), large=False) for x, y in inside_mm.T.tolist()], shape
+        )
+        x, y = at_mm - body.centroid_mm[:, None]
+        bends = np.zeros((x.size, self.moved.shape[1]))
+        for k, poses in enumerate(self.poses):
+            pose = poses.get(body.name, BodyPose(0.0, 0.0, 0.0))
+            turn = pose.angle_mrad / MRAD
+            rigid = np.stack([pose.x_mm - turn * y, pose.y_mm + turn * x])
+            bends[:, k] = place.px_per_mm * np.sum(outward * (moved_mm[:, :, k].T - rigid), axis=0)
+        return replace(chunks, bends=bends)
+
+
+def bending_of(mechanism: Mechanism) -> Bending | None:
+    """Compute how the bodies of a drawing bend; None for a drawing that cannot be computed as it is driven."""
+    try:
+        model = MechanismFrame(mechanism)
+        moved = model.driven.unit_by_drive * model.input_at_yield_mm
+    except FingervisionError:
+        return None
+    return Bending(model, moved, tuple(model.drawn_poses(each, large=False) for each in moved.T))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class BodyOutline:
     """A body and the straight stretches of its outline, in millimetres.
 
@@ -86,11 +136,14 @@ class BodyOutline:
         The body in the drawing.
     starts_mm, ends_mm : ndarray of float, shape (2, k)
         Ends of the stretches, with the body on their left.
+    bending : Bending or None
+        How it bends; None where that is not known.
     """
 
     body: LinkBody
     starts_mm: Array
     ends_mm: Array
+    bending: Bending | None = None
 
     def chunks(self, place: Placement) -> Chunks:
         """Divide the straight stretches into chunks, in pixels of the undistorted plane."""
@@ -108,69 +161,17 @@ class BodyOutline:
             for at in FROM_CORNERS_PX + free * (np.arange(count) + 0.5) / count:
                 middles.append(starts[:, k] + at * way)
                 normals.append(out)
-        shape = (2, 0)
-        return Chunks(
-            np.array(middles).T if middles else np.zeros(shape),
-            np.array(normals).T if normals else np.zeros(shape),
-            0.5 * CHUNK_PX,
-        )
+        found = Chunks(np.reshape(middles, (-1, 2)).T, np.reshape(normals, (-1, 2)).T, 0.5 * CHUNK_PX)
+        return found if self.bending is None else self.bending.of(self.body, found, place)
 
     def about_px(self, place: Placement) -> Array:
         """Reference point of the body, in pixels of the undistorted plane."""
         return np.asarray(place.to_flat_px(self.body.centroid_mm[:, None])[:, 0])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Bending:
-    """How the bodies of a mechanism bend as it is driven, beside their rigid motions.
-
-    Without it, a body's pose would be that of the edges that happen to be seen, and a bent edge would count as a wrong
-    one: the pose of a stubby lever was off by 0.5 mrad, fifty times its uncertainty.
-
-    Parameters
-    ----------
-    model : MechanismFrame
-        Elastic model of the drawing.
-    moved : ndarray of float, shape (unknowns, k)
-        Its small displacements by each drive, at the input at which its flexures yield.
-    poses : tuple of mapping of str to BodyPose
-        Poses of the moving bodies in each of them.
-    """
-
-    model: MechanismFrame
-    moved: Array
-    poses: tuple[Mapping[str, BodyPose], ...]
-
-    def of(self, body: LinkBody, chunks: Chunks, place: Placement) -> Chunks:
-        """Add to the chunks of a moving body how each moves outwards as the body bends."""
-        if body.name not in self.poses[0]:
-            return chunks
-        at_mm = place.axes.T @ (chunks.middles - place.origin_px[:, None]) / place.px_per_mm
-        outward = place.axes.T @ chunks.normals
-        inside_mm = at_mm - BESIDE * self.model.mechanism.region.size_mm * outward
-        moved_mm = np.array([self.model.motion_mm(self.moved, (x, y), large=False) for x, y in inside_mm.T.tolist()])
-        x, y = at_mm - body.centroid_mm[:, None]
-        bends = np.zeros((x.size, self.moved.shape[1]))
-        for k, poses in enumerate(self.poses):
-            turn = poses[body.name].angle_mrad / MRAD
-            rigid = np.stack([poses[body.name].x_mm - turn * y, poses[body.name].y_mm + turn * x])
-            bends[:, k] = place.px_per_mm * np.sum(outward * (moved_mm[:, :, k].T - rigid), axis=0)
-        return replace(chunks, bends=bends)
-
-
-def bending_of(mechanism: Mechanism) -> Bending | None:
-    """Compute how the bodies of a drawing bend; None for a drawing that cannot be computed as it is driven."""
-    try:
-        model = MechanismFrame(mechanism)
-        moved = model.driven.unit_by_drive * model.input_at_yield_mm
-    except FingervisionError:
-        return None
-    return Bending(model, moved, tuple(model.drawn_poses(each, large=False) for each in moved.T))
-
-
 def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
     """Select the straight edges of every body of the drawing, without the cuts through flexures."""
-    region = mechanism.region
+    region, bending = mechanism.region, bending_of(mechanism)
     beside = BESIDE * region.size_mm
     found = []
     for body in bodies_of(mechanism):
@@ -185,7 +186,7 @@ def outlines_of(mechanism: Mechanism) -> tuple[BodyOutline, ...]:
                 if not region.holds(outside[:, None])[0]:
                     starts.append(a)
                     ends.append(b)
-        found.append(BodyOutline(body, np.array(starts).reshape(-1, 2).T, np.array(ends).reshape(-1, 2).T))
+        found.append(BodyOutline(body, np.reshape(starts, (-1, 2)).T, np.reshape(ends, (-1, 2)).T, bending))
     return tuple(found)
 
 

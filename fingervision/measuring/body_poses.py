@@ -15,7 +15,7 @@ from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.numbers import with_uncertainty
 from fingervision.gauges.picture import Picture, picture_of
 from fingervision.gauges.plane_scale import PlaneScale
-from fingervision.measuring.body_outlines import BodyOutline, bending_of, outlines_of
+from fingervision.measuring.body_outlines import BodyOutline, outlines_of
 from fingervision.measuring.drawing_placement import (
     LEVELS,
     GivenPoint,
@@ -190,11 +190,7 @@ class BodyTracker:
         shares = (inside / picture.top, ground / picture.top)
         u_px = u_edge_px(self.settings.camera.response, *shares, laid.fit.blur_px)
         self._shared = SharedErrors(laid.fit, laid.about_px, plane, u_px)
-        bending = bending_of(self.mechanism)
         self._chunks = [outline.chunks(laid.place) for outline in self.outlines]
-        if bending is not None:
-            self._chunks = [bending.of(outline.body, chunks, laid.place)
-                            for outline, chunks in zip(self.outlines, self._chunks, strict=True)]  # fmt: skip
         self._about = [outline.about_px(laid.place) for outline in self.outlines]
         self._last: list[tuple[Array, float]] = [(np.zeros(2), 0.0)] * len(self.outlines)
         self._check_size(grey, index, self._view(picture))

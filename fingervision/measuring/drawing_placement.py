@@ -252,6 +252,7 @@ def together(parts: Sequence[Chunks]) -> Chunks:
         np.concatenate([part.middles for part in parts], axis=1),
         np.concatenate([part.normals for part in parts], axis=1),
         parts[0].half_length,
+        np.concatenate([part.bends for part in parts], axis=0),
     )
 
 
