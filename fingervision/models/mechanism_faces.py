@@ -30,7 +30,8 @@ _LEVER = 1e-6
 _RIGIDLY = 1e-6
 """Largest difference between the motion that a drive prescribes and the nearest motion of a rigid body, over it."""
 _SLENDER = 5.0
-"""Square of a body's length over its area from which it bends as a beam, so that its own deformation is an answer."""
+"""Length over width, straightened, from which a body bends as a beam, so that its own deformation is an answer: a
+cantilever's stiffness is then within 3 %, the models' error of a force, of 3 E I / L^3 (at 3 times 8 % lower)."""
 
 
 def nodes_on(plate: PlaneStressPlate, face: Face, mechanism: Mechanism, size_mm: float) -> Indices:
@@ -245,7 +246,9 @@ def _refuse_held_bodies(plate: PlaneStressPlate, mechanism: Mechanism, supports:
             :, plate.corner_triangles[:, piece[plate.corner_triangles[0]] == body]
         ]
         area = 0.5 * np.abs((x2 - x1) * (y3 - y1) - (x3 - x1) * (y2 - y1)).sum()
-        if np.hypot(*np.ptp(plate.nodes_mm[:, piece == body], axis=1)) ** 2 > _SLENDER * area:
+        sides = plate.nodes_mm[:, plate.outline_edges[:2, piece[plate.outline_edges[2]] == body]]
+        # A strip of length L and width h has the perimeter 2 (L + h), whichever way it is bent.
+        if 0.25 * np.hypot(*np.diff(sides, axis=1)[:, 0]).sum() ** 2 / area - 2.0 > _SLENDER:
             continue
         necks = [at for at, _ in necks_of(mechanism.region, flexures)]
         nearest = [np.argmin(np.hypot(*(plate.nodes_mm - np.array([at]).T))) for at in necks]

@@ -287,3 +287,43 @@ flexure = [{ name = "h", kind = "leaf", at_mm = [21, 0], axis_deg = 0, thickness
     mechanism = read_mechanism(tmp_path / "beam.toml")
     for kind in (MechanismFrame, MechanismPlate):
         assert kind(mechanism).stiffness_n_mm == pytest.approx(3.0 * 70000.0 * 5.0 / 12.0 / 19.5**3, rel=0.02)
+
+
+HELD = """
+plate_mm = 5.0
+material = {{ name = "m", youngs_modulus_mpa = 70000, poisson_ratio = 0.33, density_kg_m3 = 2700, yield_mpa = 300 }}
+fixed = [{{ box_mm = {foot} }}]
+body = [{bodies}, {{ box_mm = ["{x} + 1.6", "{x} + 10", "{y} - 3", "{y} + 3"] }}]
+drive = {{ box_mm = {face}, direction = [0, 1], across = "free" }}
+[[flexure]]
+name = "h"
+kind = "leaf"
+at_mm = ["{x} + 0.8", "{y}"]
+axis_deg = 0
+thickness_mm = 0.3
+half_length_mm = 1
+"""
+
+
+def held_body(folder: Path, arm_mm: float, across_mm: float) -> Mechanism:
+    """An upright strip of 2 mm, clamped at its foot, with a cross arm that is driven at its end; or the arm alone."""
+    y = arm_mm - 1.0
+    bodies = f"{{ box_mm = [0, {across_mm}, {arm_mm - 2.0}, {arm_mm}] }}"
+    foot = [0.0, 0.0, arm_mm - 2.0, arm_mm]
+    if arm_mm > 2.0:
+        bodies, foot = f"{{ box_mm = [0, 2, 0, {arm_mm}] }}, {bodies}", [0.0, 2.0, 0.0, 0.0]
+    face = [across_mm - 1.0, across_mm, arm_mm, arm_mm]
+    (folder / "held.toml").write_text(HELD.format(foot=foot, bodies=bodies, x=f"{across_mm}", y=f"{y}", face=face))
+    return read_mechanism(folder / "held.toml")
+
+
+@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame])
+def test_a_bent_strip_is_as_slender_as_a_straight_one(tmp_path: Path, kind: type) -> None:
+    """An L of 8 by 8 mm is a beam of 14 by 2 mm: of both arms' bending, 3 E I / (b^3 + 3 a b^2)."""
+    a, b = 7.0, 6.5
+    beam_n_mm = 3.0 * 70000.0 * 5.0 * 2.0**3 / 12.0 / (b**3 + 3.0 * a * b**2)
+    assert kind(held_body(tmp_path, 8.0, 8.0)).stiffness_n_mm == pytest.approx(beam_n_mm, rel=0.08)
+    assert kind(held_body(tmp_path, 2.0, 14.0)).stiffness_n_mm > 0.0
+    for stubby in ((2.0, 6.0), (4.0, 4.0)):
+        with pytest.raises(DataError, match="must be able to move its body"):
+            kind(held_body(tmp_path, *stubby))
