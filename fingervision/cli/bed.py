@@ -107,8 +107,9 @@ Examples:
   fingervision bed stop --bed lab.toml
 
 \b
-If another fingervision process drives this test bed, it is asked to stop the motor and to end. This command is no
-emergency stop: that must be a separate circuit which disconnects the motor's supply, see
+If another fingervision process has the stage's serial port open, it is asked to stop the motor and to end. Where it
+speaks to the controller otherwise (over a network, or on Windows), end it first: two programs confuse a controller.
+This command is no emergency stop: that must be a separate circuit which disconnects the motor's supply, see
 fingervision/testbed/firmware/README.md.
 """
 

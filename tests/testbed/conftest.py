@@ -9,8 +9,8 @@ import pytest
 from fingervision.models.kinds import GripperModel, build_model
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
-from fingervision.testbed.board.link import opened_port
 from fingervision.testbed.manual import manual_control
+from fingervision.testbed.serial_port import opened_port
 from tests.testbed.board_bed import CONTRACT_STEPS, times_of, written_bed
 from tests.testbed.emulated_board import EmulatedBoard, MotorController, compiled, missing_tools, running
 
@@ -49,7 +49,7 @@ def emulated(sketch: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> Iter
     """A board that was just switched on; its time stops while a byte is being transferred."""
     with running(sketch, SLOWER) as board:
         opened = "fingervision.testbed.board.board.opened_port"
-        monkeypatch.setattr(opened, lambda name: board.shared.counted(opened_port(name)))
+        monkeypatch.setattr(opened, lambda *how: board.shared.counted(opened_port(*how)))
         yield board
 
 

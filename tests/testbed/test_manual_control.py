@@ -1,17 +1,25 @@
 """Single motions on the simulated test bed: limits, monitoring and stop, and the commands that request them."""
 
+import signal
 from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
 from fingervision.domain.errors import DeviceError, LimitError
+from fingervision.domain.frame import Frame
+from fingervision.domain.status import Status
 from fingervision.testbed.actuator import Alarm
 from fingervision.testbed.actuators.simulated import SimulatedActuator
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
+from fingervision.testbed.cameras.simulated import SimulatedCamera
 from fingervision.testbed.manual import manual_control
+from fingervision.vision.pipeline import Settings, measure_frame
 
 
 @pytest.fixture
@@ -81,3 +89,72 @@ def test_the_commands_say_where_it_stands() -> None:
         done = CliRunner().invoke(cli, ["bed", *words])
         assert done.exit_code == 0, done
         assert done.output.startswith(begins)
+
+
+CLOSED = """
+schema = 1
+[actuator]
+kind = "simulated"
+[camera]
+kind = "simulated"
+[gripper]
+[scale]
+px_per_mm = 34.0
+[limits]
+gap_mm = 0.3
+"""
+
+
+@pytest.fixture
+def narrow(tmp_path: Path) -> Iterator[Bed]:
+    (tmp_path / "bed.toml").write_text(CLOSED, encoding="utf-8")
+    bed = open_bed(str(tmp_path / "bed.toml"))
+    yield bed
+    bed.close()
+
+
+def test_a_target_at_which_the_gripper_would_close_too_far_is_not_approached(narrow: Bed) -> None:
+    with pytest.raises(LimitError, match=r"limit of gap, 0\.3 mm, but leads to -[\d.]+ mm by its \[gripper\]: nothing"):
+        manual_control.move(narrow, -1.8, 5.0)
+    assert narrow.actuator.readings()[-1].value == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_jog_ends_where_the_gap_reaches_its_limit_and_leads_back_from_beyond(narrow: Bed) -> None:
+    assert narrow.model is not None
+    at_mm = manual_control.jog(narrow, -0.5)
+    late_mm = 0.5 * 2.0 * manual_control.LOOK_EVERY_S
+    gaps_mm = narrow.model.respond(np.array([at_mm, at_mm + late_mm + close_enough_mm(narrow)])).gap_mm
+    assert gaps_mm[0] - 1e-9 <= narrow.limits.gap_mm <= gaps_mm[1]
+    assert manual_control.jog(narrow, 0.5, for_s=0.4) > at_mm
+
+
+def test_fingers_that_meet_do_not_pass_through_each_other(narrow: Bed) -> None:
+    assert narrow.camera is not None
+    narrow.actuator.move(-1.8, 5.0)
+    narrow.clock.wait_until(narrow.clock.now_s() + 1.0)
+    item = narrow.camera.next().item()
+    assert isinstance(item, Frame)
+    assert measure_frame(item, Settings(0.3 * 34.0)).status is not Status.OK
+
+
+def test_a_frame_that_the_camera_announced_is_not_lost_if_it_is_fetched_late(narrow: Bed) -> None:
+    camera = narrow.camera
+    assert isinstance(camera, SimulatedCamera)
+    first = camera.next()
+    assert camera.ready(1.0)
+    narrow.clock.wait_until(narrow.clock.now_s() + 0.01)
+    assert camera.next().device_s == pytest.approx(first.device_s + 0.04)
+
+
+def test_a_stop_that_fails_is_not_taken_for_a_spoilt_answer() -> None:
+    def stop() -> None:
+        raise DeviceError("The stage must stop, but could not be told to.")
+
+    def asked_again() -> None:
+        with suppress(DeviceError):
+            signal.raise_signal(signal.SIGINT)
+        pytest.fail("The motion went on.")
+
+    with manual_control.motor_stops_first(stop), pytest.raises(manual_control.Interrupted) as end:
+        asked_again()
+    assert isinstance(end.value.__cause__, DeviceError)

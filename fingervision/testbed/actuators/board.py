@@ -14,13 +14,13 @@ from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import Alarm, StageLimits
 from fingervision.testbed.board import wire
 from fingervision.testbed.board.board import KEY, Board, board_of
-from fingervision.testbed.board.link import fingervision_at
 from fingervision.testbed.board.motions import Controller, Motions, Run, controller_of
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
 from fingervision.testbed.force_sensor import Reading
 from fingervision.testbed.motion.move_limits import PUBLISHED, PUBLISHED_KEYS, check_move, check_speed, stage_limits
 from fingervision.testbed.motion.step_checks import jog_step, planned, route
+from fingervision.testbed.serial_port import fingervision_at
 
 SIMULATED = False
 KEYS = (KEY, "steps", *PUBLISHED_KEYS, *names_of(Controller))

@@ -13,7 +13,7 @@ import serial
 
 from fingervision.domain.errors import DeviceError
 from fingervision.storage.toml_section import Section
-from fingervision.testbed.actuator import RefusedError, in_a_line
+from fingervision.testbed.actuator import RefusedError
 from fingervision.testbed.actuators._single_axis import KEYS as AXIS
 from fingervision.testbed.actuators._single_axis import (
     AxisSettings,
@@ -23,7 +23,7 @@ from fingervision.testbed.actuators._single_axis import (
 )
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import Clock
-from fingervision.testbed.text_protocol.line import WRITE_S, told
+from fingervision.testbed.serial_port import opened_port, told
 
 __all__ = ["KEYS", "SIMULATED", "KinesisStage", "build", "without_hardware"]
 KEYS = ("port", "channel", "bay", "counts_per_mm", "controller", "acceleration_mm_s2", *AXIS)
@@ -147,9 +147,9 @@ def build(section: Section, context: BuildContext) -> KinesisStage:
     channel, bay = section.whole("channel", 1, low=1, high=3), section.whole("bay", 0, low=0, high=10)
     counts = section.number("counts_per_mm", above=0.0)
     ramp = section.number("acceleration_mm_s2", above=0.0) if "acceleration_mm_s2" in section.values else None
-    try:
-        port = serial.serial_for_url(name, baudrate=BAUD, timeout=0.02, write_timeout=WRITE_S)
-    except Exception as error:  # pyserial raises exceptions of several classes
-        section.refuse("port", f"must be that of a controller, but {name} could not be opened ({in_a_line(error)}).")
     unit = 0x20 + bay if bay else UNIT
+    try:
+        port = opened_port(name, BAUD, 0.02)
+    except DeviceError as error:
+        section.refuse("port", f"must be that of a controller, but was not opened. {error}")
     return KinesisStage(port, channel, unit, counts, period_s, ramp, context.clock, settings).at_rest()

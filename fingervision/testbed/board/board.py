@@ -14,9 +14,10 @@ from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.storage.board_toml import read_board
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.board import wire
-from fingervision.testbed.board.link import ASK_EVERY_S, BoardLink, BoardRefusalError, opened_port
+from fingervision.testbed.board.link import ASK_EVERY_S, BAUD, READ_TIMEOUT_S, BoardLink, BoardRefusalError
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.clocks.clock import FEWEST, Clock, JoinedClock
+from fingervision.testbed.serial_port import opened_port
 
 # Opening the port may reset the board, which then starts its sketch within two seconds.
 STARTS_WITHIN_S = 1.0
@@ -230,7 +231,7 @@ def opened(settings: BoardSettings, clock: Clock) -> Board:
         There is no such port, another program has it, nothing answers, it has another firmware, or its sketch cannot
         drive the stated wiring.
     """
-    board = Board(settings, opened_port(settings.port), clock)
+    board = Board(settings, opened_port(settings.port, BAUD, READ_TIMEOUT_S), clock)
     try:
         board.set_up()
     except BaseException:

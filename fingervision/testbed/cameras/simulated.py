@@ -92,14 +92,15 @@ class SimulatedCamera:
         self._jitter_s, self._fingers_mm, self._seed = arrival_s[1], fingers_mm, seed
         self._own = OwnClock.drawn(np.random.default_rng([seed, 3]))
         self._exposure, self._index = int(np.ceil(self._own.shows_s(clock.now_s()) * rate_hz)), 0
+        self._announced: int | None = None
         gripper.looked_at(self._own.bed_s(self._exposure / rate_hz), 1.0 / (rate_hz * self._own.rate))
 
     def next(self) -> Taken:
         """Wait for the next frame and return it; earlier frames that were not requested are lost."""
         while True:
             device_s, exposed_s, arrived_s = self._times_s()
-            self._exposure += 1
-            if arrived_s >= self._clock.now_s():
+            is_announced, self._exposure = self._exposure == self._announced, self._exposure + 1
+            if is_announced or arrived_s >= self._clock.now_s():
                 break
         self._clock.wait_until(arrived_s)
         index, exposure, placed = self._index, self._exposure - 1, self.placed
@@ -110,7 +111,11 @@ class SimulatedCamera:
         """Wait for the next frame, but no longer than a time; return whether it is there."""
         arrived_s, until_s = self._times_s()[2], self._clock.now_s() + within_s
         self._clock.wait_until(min(arrived_s, until_s))
-        return arrived_s <= until_s
+        if arrived_s > until_s:
+            return False
+        # A camera keeps the frame that it announces, however soon it is fetched.
+        self._announced = self._exposure
+        return True
 
     def _times_s(self) -> tuple[float, float, float]:
         """Time stamp, exposure and arrival of the next frame."""
@@ -157,7 +162,7 @@ class SimulatedCamera:
         # The measuring height lies in the middle of the picture, where a lens causes no displacement along the fingers.
         below_px, middle_px = below_mm * scale, (self.description.height_px - 1) / 2
         return two_fingers(
-            float(seen.gap_mm[0]) * scale,
+            max(float(seen.gap_mm[0]), 0.0) * scale,  # fingers that meet do not pass through each other
             below_tip_px=below_px,
             direction=Direction.DOWN if placed.turned else Direction.UP,
             width_px=width_mm * scale,

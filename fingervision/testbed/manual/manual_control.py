@@ -9,11 +9,12 @@ from math import copysign, inf
 from time import monotonic, sleep
 from types import FrameType
 
-from fingervision.domain.errors import DeviceError, FingervisionError, StateError
+from fingervision.domain.errors import DeviceError, FingervisionError, LimitError, StateError
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import SIMULATED, open_bed, read_configuration
 from fingervision.testbed.device_kinds import kind_of
 from fingervision.testbed.motion.move_limits import check_move
+from fingervision.testbed.serial_port import holder
 from fingervision.testbed.terminal import handled
 
 LOOK_EVERY_S = 0.02
@@ -22,7 +23,7 @@ WARNING_S = 0.1
 
 
 class Interrupted(BaseException):
-    """Ctrl-C or a request to end; the motor was stopped before this exception was raised."""
+    """Ctrl-C or a request to end; the motor was stopped before this exception was raised, or its cause says why not."""
 
 
 Looking = Callable[[], tuple[float, float | None]]
@@ -42,7 +43,11 @@ def motor_stops_first(stop: Callable[[], None]) -> Iterator[None]:
     """Within the `with` block, Ctrl-C and SIGTERM stop the motor first; signals reach the main thread only."""
 
     def note(number: int, frame: FrameType | None) -> None:
-        stop()
+        # Not the error of a stop itself: a question that is being asked would be asked again after it.
+        try:
+            stop()
+        except FingervisionError as error:
+            raise Interrupted from error
         raise Interrupted
 
     with handled(note):
@@ -63,6 +68,11 @@ def move(bed: Bed, to_mm: float, speed_mm_s: float, looking: Looking | None = No
         The target or the speed is beyond a limit (nothing was moved), or the motion was interrupted.
     """
     check_move(bed.limits, to_mm, speed_mm_s)
+    for value, limit, unit, what in bed.limits.broken_at(to_mm, bed.model):
+        raise LimitError(
+            f"The target must keep the test bed's limit of {what}, {limit:g} {unit}, but leads to {value:.3g} {unit} "
+            "by its [gripper]: nothing was moved."
+        )
     return _watched(bed, lambda: bed.actuator.move(to_mm, speed_mm_s), looking=looking)
 
 
@@ -72,9 +82,13 @@ def jog(bed: Bed, speed_mm_s: float, for_s: float = inf, looking: Looking | None
     # A stored step that has begun runs to its end unless it is stopped in time.
     check_move(bed.limits, end_mm, abs(speed_mm_s))
     last_mm = end_mm - (WARNING_S * speed_mm_s if bed.actuator.has_steps else 0.0)
+    from_mm = bed.actuator.readings()[-1].value
+    # From beyond a limit of the gripper's, a jog may lead back.
+    keeps = not any(bed.limits.broken_at(from_mm, bed.model))
 
     def enough(at_mm: float) -> bool:
-        return copysign(1.0, speed_mm_s) * (at_mm - last_mm) >= 0.0
+        is_beyond = copysign(1.0, speed_mm_s) * (at_mm - last_mm) >= 0.0
+        return is_beyond or (keeps and any(bed.limits.broken_at(at_mm, bed.model)))
 
     return _watched(bed, lambda: bed.actuator.jog(speed_mm_s), for_s, enough, looking)
 
@@ -103,7 +117,9 @@ def _watched(
                     bed.actuator.stop()
             at_mm, force_n = looking()
             bed.check(force_n, bed.limits.force_n)
-    except Interrupted:
+    except Interrupted as end:
+        if end.__cause__ is not None:
+            raise end.__cause__ from None
         at_mm, _ = looking()
         raise StateError(f"Stopped: the motor has stopped near {at_mm:z.3f} mm.") from None
     except FingervisionError:
@@ -134,13 +150,12 @@ def stop_bed(name: str) -> str:
         return "The simulated test bed is at rest: its motor moves only while a command runs."
     top = read_configuration(name)
     section = top.table("actuator")
-    find_holder = getattr(kind_of("actuator", section), "holder", None)
-    process = None if find_holder is None else find_holder(section, top.path.parent)
+    find_holder = getattr(kind_of("actuator", section), "holder", holder)
     words = ""
-    if process is not None:
+    if (process := find_holder(section, top.path.parent)) is not None:
         os.kill(process, signal.SIGTERM)
         until_s = monotonic() + LETS_GO_WITHIN_S
-        while find_holder is not None and find_holder(section, top.path.parent) is not None:
+        while find_holder(section, top.path.parent) is not None:
             if monotonic() > until_s:
                 raise DeviceError(
                     f"Process {process} must release the test bed within {LETS_GO_WITHIN_S:g} s, but does "

@@ -1,5 +1,6 @@
 """Limits of a stage and of recipes (soft limits): what a configuration states, and what a motion must keep."""
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from math import inf
 from typing import Annotated
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from fingervision.domain.errors import LimitError
 from fingervision.domain.field import Field, names_of
+from fingervision.domain.model import Model
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import StageLimits
 
@@ -107,6 +109,8 @@ PUBLISHED_KEYS = LIMIT_KEYS[:5]
 
 # Soft limits: the range allowed for recipes and jogs, within the limits of the actuator.
 
+# Tolerance of the limits for the rounding of positions.
+SLACK_MM = 1e-9
 # Positions at which the model is computed, and their margin beyond the limits: readings may lie beyond them.
 POSITIONS, BEYOND_MM = 201, 0.06
 
@@ -137,6 +141,18 @@ class SoftLimits:
     def tabulated_mm(self) -> NDArray[np.float64]:
         """Positions at which a model is tabulated, in mm, shape (n,)."""
         return np.linspace(self.lower_mm - BEYOND_MM, self.upper_mm + BEYOND_MM, POSITIONS)
+
+    def broken_at(
+        self, at_mm: float, model: Model | None, most_n: float | None = None
+    ) -> Iterator[tuple[float, float, str, str]]:
+        """Yield the limits that the gripper breaks at a position by its model: value, limit, its unit and name."""
+        if model is None:
+            return
+        answer, limit_n = model.respond(np.array([at_mm])), self.force_n if most_n is None else most_n
+        if answer.force_n is not None and (needed_n := abs(float(answer.force_n[0]))) > limit_n:
+            yield needed_n, limit_n, "N", "force"
+        if (gap_mm := float(answer.gap_mm[0])) < self.gap_mm - SLACK_MM:
+            yield gap_mm, self.gap_mm, "mm", "gap"
 
     def within(self, able: StageLimits) -> "SoftLimits":
         """Narrow the limits to those of an actuator."""

@@ -3,19 +3,15 @@
 from collections.abc import Iterator, Sequence
 from math import ceil
 
-import numpy as np
-
 from fingervision.domain.errors import FingervisionError, LimitError
 from fingervision.domain.model import Model
 from fingervision.domain.recipe import Recipe
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import MoveCheck
-from fingervision.testbed.motion.move_limits import SoftLimits
+from fingervision.testbed.motion.move_limits import SLACK_MM, SoftLimits
 from fingervision.testbed.recipe_kinds import Act, Close, Go, Leg, Rezero, Shift, Slot, Stand, Swing, Turn, step_of
 from fingervision.testbed.recipe_kinds.sine import fastest_mm_s
 
-# Tolerance of the limits for the rounding of positions.
-SLACK_MM = 1e-9
 # Time for settling before the frames at a point.
 SETTLE_S = 0.3
 REZERO_S = 2.0
@@ -155,14 +151,8 @@ def _check(leg: Leg, limits: SoftLimits, model: Model | None, below_force_n: flo
         if not limits.lower_mm - SLACK_MM <= at_mm <= limits.upper_mm + SLACK_MM:
             limit_mm = limits.upper_mm if at_mm > limits.upper_mm else limits.lower_mm
             _beyond(section, leg.key, at_mm, limit_mm, "mm", "position")
-        if model is None:
-            continue
-        answer = model.respond(np.array([at_mm]))
-        needed_n = 0.0 if answer.force_n is None else abs(float(answer.force_n[0]))
-        if needed_n > most_n:
-            _beyond(section, leg.key, needed_n, most_n, "N", f"force at {at_mm:g} mm")
-        if (gap_mm := float(answer.gap_mm[0])) < limits.gap_mm - SLACK_MM:
-            _beyond(section, leg.key, gap_mm, limits.gap_mm, "mm", f"gap at {at_mm:g} mm")
+        for value, limit, unit, what in limits.broken_at(at_mm, model, most_n):
+            _beyond(section, leg.key, value, limit, unit, f"{what} at {at_mm:g} mm")
 
 
 def _beyond(section: Section, key: str, value: float, limit: float, unit: str, what: str) -> None:

@@ -21,9 +21,9 @@ from fingervision.testbed.bed_factory import (
     stated_scale,
 )
 from fingervision.testbed.device_kinds import PluggedKind
-from fingervision.testbed.motion.move_limits import SoftLimits
+from fingervision.testbed.motion.move_limits import SLACK_MM, SoftLimits
 from fingervision.testbed.recipe_kinds import Leg
-from fingervision.testbed.run.plan import SLACK_MM, check_moves, frames_of, legs_of, plan
+from fingervision.testbed.run.plan import check_moves, frames_of, legs_of, plan
 from fingervision.testbed.run.run_folder import BYTES_PER_PX
 
 CAMERA_PX, CAMERA_HZ = (640, 480), 25.0

@@ -197,7 +197,8 @@ class Watch:
             words = "" if isinstance(outcome, GapMeasurement) else outcome.words
         raise DeviceError(
             f"The camera must show both fingers before anything moves, but does not: {words} Bring both fingers into "
-            "the picture (camera, light, focus), and run the recipe again."
+            "the picture (camera, light, focus; `fingervision bed home`, if the stage stands elsewhere), and run the "
+            "recipe again."
         )
 
     def _end_if_stopped(self) -> None:

@@ -6,42 +6,23 @@ from contextlib import suppress
 from time import monotonic, sleep
 from typing import Any
 
-import serial
-
 from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import RefusedError, in_a_line
+from fingervision.testbed.serial_port import opened_port, told
 from fingervision.testbed.text_protocol.words import Exchange, Words, filled
 
 KEYS = ("words", "port", "baud", "set")
 IDENTITY = "identity"
-WRITE_S = 1.0
 TRIES, LATE_S, CLOSES_S = 2, 0.1, 0.5
 """A question is asked again once, because one line in a noisy cable may be spoilt; a command never is."""
-
-
-def told(port: Any, data: bytes) -> None:
-    """Send bytes to a serial port by one write.
-
-    Raises
-    ------
-    DeviceError
-        The port took nothing for its time limit.
-    """
-    try:
-        port.write(data)
-    except serial.SerialTimeoutException as error:
-        raise DeviceError(
-            f"The device at {port.port} must take what it is told within {WRITE_S:g} s, but did not: switch it on, and "
-            "check its cable and its flow control (rtscts, xonxoff)."
-        ) from error
 
 
 class SerialPort:
     """A serial port by its name (`/dev/ttyUSB0`, `COM3`), or a pyserial address such as `socket://host:port`."""
 
     def __init__(self, name: str, baud: int, options: Mapping[str, Any]) -> None:
-        self._port = serial.serial_for_url(name, baudrate=baud, timeout=0.0, write_timeout=WRITE_S, **options)
+        self._port = opened_port(name, baud, 0.0, **options)
         self.rest = b""
         """What came without the end of a line."""
 
@@ -262,9 +243,11 @@ def opened_line(section: Section, words: Words) -> Line:
             )
         else:
             port = SerialPort(name, words.baud, words.serial)
+    except DeviceError as error:
+        section.refuse("port", f"must be that of {words.name}, but was not opened. {error}")
     except ImportError as error:
         section.refuse("port", f"is a VISA resource, which needs pyvisa ({error}): pip install 'fingervision[visa]'.")
-    except Exception as error:  # pyserial and each VISA library raise exceptions of their own classes
+    except Exception as error:  # each VISA library raises exceptions of its own classes
         section.refuse("port", f"must be that of {words.name}, but {name} could not be opened ({in_a_line(error)}).")
     try:
         return Line(port, words)

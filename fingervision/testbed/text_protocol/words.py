@@ -131,6 +131,10 @@ def words_of(section: Section, folder: Path, needed: tuple[str, ...]) -> Words:
     if missing:
         top.refuse(None, f"must have [{'], ['.join(needed)}], but has no [{missing[0]}]: add it.")
     settings = _set(section, top.table("settings").values)
+    check = top.table("check")
+    # Asked once more because its answer fits nothing, a controller that forgets an error once it is read says "none".
+    if check.values and not _pattern(check, "reply", settings).groups:
+        check.refuse("reply", "must have a group that holds the error, if there is one, as in '^(?:0|(.+))$'.")
     return Words(
         name=top.word("name"),
         baud=section.whole("baud", top.whole("baud", 9600, low=50, high=10_000_000), low=50, high=10_000_000),
@@ -163,14 +167,12 @@ def _exchange(top: Section, table: Section, settings: Mapping[str, Any], keys: t
     lines = (said,) if isinstance(said, str) else tuple(said) if isinstance(said, list) else None
     if lines is None or not all(isinstance(each, str) for each in lines):
         table.refuse("say", f"must be a text or a list of texts, but is {said!r}.")
+    # Only a motion has a target and a speed: a stop that asks for them could not be said.
+    values = {**({"to": 0.0, "speed": 0.0} if "speed_per_mm_s" in keys else {}), **settings}
     for line in lines:
-        try:
-            filled(line, {**settings, "to": 0.0, "speed": 0.0})
-        except (KeyError, IndexError, ValueError) as error:
-            known = ", ".join(("to", "speed", *settings))
-            table.refuse(
-                "say", f"must have no placeholders but {known}, each as {{to:.4f}}, but is {line!r} ({error})."
-            )
+        _check_placeholders(table, "say", line, values)
+    if "stop" in table.values:
+        _check_placeholders(table, "stop", table.word("stop"), values)
     if "moving" in keys and "moving_bits" not in table.values:
         _pattern(table, "moving", settings)
     for key in (*SCALES, "keep"):
@@ -187,6 +189,15 @@ def _exchange(top: Section, table: Section, settings: Mapping[str, Any], keys: t
         more={key: settings.get(value, value) if key in SCALES else value
               for key, value in table.values.items() if key not in SAID},
     )  # fmt: skip
+
+
+def _check_placeholders(table: Section, key: str, line: str, values: Mapping[str, str | float]) -> None:
+    """Refuse a text with a placeholder that has no value when it is said."""
+    try:
+        filled(line, values)
+    except (KeyError, IndexError, ValueError) as error:
+        known = f"but {', '.join(values)}" if values else "in this table"
+        table.refuse(key, f"must have no placeholders {known}, each as {{to:.4f}}, but is {line!r} ({error}).")
 
 
 def _pattern(section: Section, key: str, settings: Mapping[str, Any]) -> re.Pattern[str]:
@@ -218,4 +229,5 @@ def number_in(found: re.Match[str], who: str) -> float:
     try:
         return float(words)
     except (TypeError, ValueError):
-        raise DataError(f"{who} must answer with a number, but answered {found.string!r}.") from None
+        group = "" if found.re.groups else ": put a group, ( ), around the number in its reply"
+        raise DataError(f"{who} must answer with a number, but answered {found.string!r}{group}.") from None

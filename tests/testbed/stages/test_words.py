@@ -1,6 +1,11 @@
 """Files of words: the one of the manual drives its invented controller, and mistakes are named with their line."""
 
+import os
 import re
+import signal
+import subprocess
+import sys
+import threading
 from contextlib import suppress
 from pathlib import Path
 
@@ -219,3 +224,57 @@ def test_an_unknown_name_is_refused_with_the_known_ones(tmp_path: Path) -> None:
     path = Case(Invented, text("grlb")).bed_at(tmp_path, Invented())
     with pytest.raises(DataError, match="did you mean grbl"):
         open_bed(str(path))
+
+
+@pytest.mark.parametrize(
+    ("replaced", "by", "said"),
+    [
+        (
+            'say = "{axis}STOP"',
+            'say = "{axis}STOP{to:.1f}"',
+            r"say in line \d+ of .* must have no placeholders but axis,",
+        ),
+        (
+            'say = "{axis}HOME"',
+            'say = "{axis}HOME {speed}"',
+            r"say in line \d+ of .* must have no placeholders but axis,",
+        ),
+        ("[stop]", "[check]\nsay = 'E?'\nreply = '^0$'\n[stop]", r"reply in line \d+ of .* must have a group"),
+    ],
+)
+def test_words_that_could_not_be_said_or_understood_are_refused_before_anything_moves(
+    replaced: str, by: str, said: str, tmp_path: Path
+) -> None:
+    assert replaced in EXAMPLE
+    device = Invented()
+    with pytest.raises(DataError, match=said):
+        open_bed(str(bed_with(EXAMPLE.replace(replaced, by), device, tmp_path)))
+    assert not device.heard
+    device.close()
+
+
+def test_a_number_outside_a_group_is_named(tmp_path: Path) -> None:
+    device = Conex()
+    with pytest.raises(DataError, match=r"must answer with a number, .* put a group, \( \), around the number"):
+        open_bed(str(bed_with(CONEX.replace("TP([-+\\d.eE]+)$'", "TP'"), device, tmp_path)))
+    device.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells which process has a port open")
+def test_stop_ends_the_program_that_has_the_port_open(tmp_path: Path) -> None:
+    ends, program = os.openpty(), tmp_path / "fingervision"
+    program.write_text("import os, sys, time\nos.open(sys.argv[1], os.O_RDWR)\nprint(flush=True)\ntime.sleep(60)\n")
+    path = bed_with(EXAMPLE, Invented(), tmp_path)
+    port = os.ttyname(ends[1])
+    path.write_text(re.sub(r"socket://[^\"]+", port, path.read_text()))
+    with subprocess.Popen([sys.executable, str(program), port], stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+        waiting = threading.Thread(target=other.wait)
+        waiting.start()
+        with pytest.raises(DataError):  # nothing answers at the port itself
+            stop_bed(str(path))
+        waiting.join()
+    assert other.returncode == -signal.SIGTERM
+    for end in ends:
+        os.close(end)
