@@ -9,6 +9,7 @@ the plane). Midside nodes lie on the arcs of the outline.
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import dist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,7 +155,7 @@ def flat_sides(sides: list[OutlineSide], points: Array, triangles: Indices) -> s
     found = set()
     for triangle in bad.T.tolist():
         pairs = [(triangle[i], triangle[j]) for i, j in ((0, 1), (1, 2), (0, 2))]
-        longest = max(pairs, key=lambda pair: float(np.hypot(*(points[:, pair[0]] - points[:, pair[1]]))))
+        longest = max(pairs, key=lambda pair: dist(points[:, pair[0]], points[:, pair[1]]))
         if frozenset(longest) in place_of:
             found.add(place_of[frozenset(longest)])
     return found
