@@ -17,17 +17,13 @@ from scipy.sparse import bmat, csr_matrix
 from scipy.sparse.linalg import splu
 
 from fingervision.domain.errors import ModelError
-from fingervision.models.mechanism_faces import mean_weights
+from fingervision.models.mechanism_faces import keeps_from_turning, mean_weights
 from fingervision.models.plane_stress import PlaneStressPlate
 
 # Coordinate frames to which a meshed body is condensed: each frame has the motion of a cut or of a face.
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-_LEVER = 1e-6
-"""Lever arms shorter than this share of the face's extent do not prevent rotation (measured across a tied
-component)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +129,6 @@ def face_frame(
     # A drive prescribes the face's mean motion, which is that of a rigid face at its weighted middle.
     at_mm = places.mean(axis=1) if weights is None else places @ weights / weights.sum()
     arms = places - at_mm[:, None]
-    extent = float(np.hypot(*arms).max())
     found: list[tuple[dict[int, float], list[float]]] = []
     dofs = {"x": plate.x_dofs[nodes], "y": plate.y_dofs[nodes]}
     levers = {"x": -arms[1], "y": arms[0]}
@@ -142,13 +137,13 @@ def face_frame(
             if dof not in taken:
                 taken.add(dof)
                 found.append(({dof: 1.0}, [float(component == "x"), float(component == "y"), lever]))
-    held = turns = any(np.abs(levers[component]).max() > _LEVER * extent for component in tied)
+    held = turns = keeps_from_turning(places, tied)
     weights = mean_weights(plate, nodes) if weights is None else weights
     for component in sorted({"x", "y"} - set(tied)):
         own, lever = dofs[component].tolist(), levers[component]
         mean = dict(zip(own, weights.tolist(), strict=True))
         found.append((mean, [float(component == "x"), float(component == "y"), float(weights @ lever)]))
-        if not held and np.abs(lever).max() > _LEVER * extent:
+        if not held and keeps_from_turning(places, (component,)):
             lever = lever - weights @ lever
             turn = dict(zip(own, (weights * lever / (weights @ lever**2)).tolist(), strict=True))
             found.append((turn, [0.0, 0.0, 1.0]))

@@ -1,6 +1,6 @@
 """Nodes of a meshed mechanism that are fixed, slide or are driven, and a test whether these supports suffice."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -97,11 +97,13 @@ def moves_in_the_mean(plate: PlaneStressPlate, nodes: Indices, drive: Drive) -> 
     prescribing the motion along it at every node would let it rotate by stretching alone; `turns` then decides whether
     its mean rotation is free.
     """
-    components = driven_components(drive)
-    places = plate.nodes_mm[:, nodes]
-    spread = np.ptp(places, axis=1)
-    parallel = len(components) == 1 and spread["yx".index(components[0])] < _LEVER * np.hypot(*spread)
-    return bool(drive.turns == "free" or parallel)
+    return drive.turns == "free" or not keeps_from_turning(plate.nodes_mm[:, nodes], driven_components(drive))
+
+
+def keeps_from_turning(places_mm: Array, components: Sequence[str]) -> bool:
+    """Whether a face cannot turn if its nodes, shape (2, k), follow a rigid body in some components of their motion."""
+    spread = np.ptp(places_mm, axis=1)
+    return any(spread["yx".index(component)] > _LEVER * np.hypot(*spread) for component in components)
 
 
 def driven_components(drive: Drive) -> tuple[str, ...]:
