@@ -16,8 +16,9 @@ from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 Array = NDArray[np.float64]
 
-_FIRST_NODES, _MOST_NODES = 13, 97
-_WITHIN = 1e-6
+_NODES = 49
+"""Drawings of which the responses are tabulated: a spline through them is within 1e-6 of those of the published sample
+and of the micro gripper, with half as many within 1.4e-5."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,30 +101,15 @@ def ratio_curves(gripper: Gripper, theory: HingeTheory, change: Callable[[float]
     if not low < 0.0 < high:
         return None
     bare = small_answer(gripper, theory)
-
-    def ratios(at: Array) -> Array:
-        answers = [small_answer(change(float(x)), theory) for x in at]
-        return np.array(
-            [
-                (a.gap_per_input / bare.gap_per_input, a.force_per_input_n_mm / bare.force_per_input_n_mm)
-                for a in answers
-            ]
-        )
-
-    nodes = np.union1d(np.linspace(low, high, _FIRST_NODES), 0.0)
+    nodes = np.union1d(np.linspace(low, high, _NODES), 0.0)
     try:
-        known = ratios(nodes)
-        while nodes.size < _MOST_NODES:
-            middles = 0.5 * (nodes[1:] + nodes[:-1])
-            between = ratios(middles)
-            error = float(np.abs(CubicSpline(nodes, known)(middles) - between).max())
-            merged = np.argsort(np.concatenate([nodes, middles]))
-            nodes = np.concatenate([nodes, middles])[merged]
-            known = np.concatenate([known, between])[merged]
-            if error < _WITHIN:
-                break
+        answers = [small_answer(change(float(by)), theory) for by in nodes]
     except FingervisionError:
         return None
+    known = np.array([
+        (each.gap_per_input / bare.gap_per_input, each.force_per_input_n_mm / bare.force_per_input_n_mm)
+        for each in answers
+    ])  # fmt: skip
     steps = np.diff(known, axis=0)
     if not np.all(np.abs(np.sign(steps).sum(axis=0)) == len(steps)):
         return None
