@@ -5,7 +5,7 @@ from itertools import permutations
 
 import numpy as np
 
-from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit, refit, scan
 from fingervision.diagnosis.inference.signatures import Signatures, tangents
 from fingervision.domain.effect import Array
@@ -178,14 +178,3 @@ def different(problem: Problem, explanations: list[Explanation], most: int) -> l
 def likeliest(candidates: list[Explanation]) -> Explanation:
     """Choose the explanation with the smallest BIC (Schwarz 1978)."""
     return min(candidates, key=lambda explanation: explanation.bic)
-
-
-def simplest(singles: list[Explanation], nothing: Explanation) -> Explanation:
-    """Choose one effect; prefer a simpler formula if a richer one gains no more than inexact formulas usually do.
-
-    For example, a small gain is no reason to prefer a resonance to a delay by a fraction of a sample.
-    """
-    best = likeliest(singles)
-    within = FORM_SHARE**2 * (nothing.score - best.score)
-    simpler = [e for e in singles if e.free < best.free and e.score - best.score < within]
-    return min(simpler, key=lambda explanation: explanation.score, default=best)

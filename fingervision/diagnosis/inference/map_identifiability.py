@@ -54,37 +54,6 @@ def imitating_effects(problem: Problem, position_map: PositionMap) -> dict[str, 
     }
 
 
-def imitating_parts(problem: Problem, position_map: PositionMap, explanation: Explanation) -> dict[str, str]:
-    """Find effects of an explanation that act like a map at their fitted parameters.
-
-    For example, a cyclic error with a period of half the range acts like a map, because a map can follow so smooth a
-    curve.
-
-    Parameters
-    ----------
-    problem : Problem
-        Estimation problem without the map.
-    position_map : PositionMap
-        The map.
-    explanation : Explanation
-        Effects found in addition to the map.
-
-    Returns
-    -------
-    reasons : dict of str to str
-        Reason, by name of effect, why it is excluded if a map is fitted.
-    """
-    chain, values = problem.chain, explanation.values
-    whole = chain.stacked(values)
-    named = [name for name in _of_the_place(problem) if name in values]
-    if not named:
-        return {}
-    alone = [whole - chain.stacked({key: value for key, value in values.items() if key != name}) for name in named]
-    columns = WhitenedColumns(problem.whitener.columns(np.stack(alone, axis=1))[0], problem.offsets)
-    _, mapped = _held(problem, position_map, columns)
-    return {name: _reason(problem) for name, held in zip(named, mapped.tolist(), strict=True) if held}
-
-
 def _of_the_place(problem: Problem) -> list[str]:
     return [
         name

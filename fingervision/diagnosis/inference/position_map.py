@@ -71,11 +71,6 @@ class PositionMap(RandomEffect):
         described = {"rms_mm": self.rms_mm.value, "length_mm": self.length_mm.value}
         return described | curve_values(self.nodes_mm.tolist(), self.curve_mm.tolist())
 
-    def is_like(self, other: "PositionMap") -> bool:
-        """Whether the map's size and correlation length agree with those of another map within the uncertainties."""
-        pairs = ((self.rms_mm, other.rms_mm), (self.length_mm, other.length_mm))
-        return all(abs(np.log(one.value / two.value)) < max(one.u or 0.0, 1e-12) / one.value for one, two in pairs)
-
     def refitted(self, problem: Problem, explanation: Explanation) -> "PositionMap":
         """Estimate the map's curve for an explanation."""
         best, covariance_of_best = estimated_coefficients(problem, explanation, MAP)

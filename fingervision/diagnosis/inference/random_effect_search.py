@@ -8,11 +8,10 @@ import numpy as np
 
 from fingervision.diagnosis.inference.explanation_candidates import different
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import MANY_STEPS, fit, refit
+from fingervision.diagnosis.inference.hypothesis_fit import fit, refit
 from fingervision.diagnosis.inference.map_identifiability import (
     foretells_other_passes,
     imitating_effects,
-    imitating_parts,
 )
 from fingervision.diagnosis.inference.position_map import NAME, PositionMap, likeliest_map, why_no_map
 from fingervision.diagnosis.inference.random_effect import FEWEST_RUNS, LEAST_GAIN, RunGains, likeliest_gains
@@ -108,32 +107,18 @@ def beside_map(state: Searched, look: Look) -> Searched:
     kept = known if known is not None and not set(known.names) & set(imitating) else None
     beside = look.again(_excluding(replace(state.data, position_map=first), imitating), kept)
     plain = beside.found.problem.without_first(first.coefficients.size)
-    parts = imitating_parts(plain, first, beside.found.best)
-    if parts and not parts.keys() & look.forced:
-        # The map was estimated together with effects that represent a part of it: estimate it again without them.
-        names = tuple(name for name in beside.found.best.names if name not in parts)
-        rest = fit(plain, names, beside.found.best.values, iterations=MANY_STEPS)
-        first, _ = likeliest_map(plain, rest)
-        beside = look.again(_excluding(replace(beside.data, position_map=first), parts))
-        plain = beside.found.problem.without_first(first.coefficients.size)
-    rest = plain.judged(beside.found.best, beside.found.best.values)
-    second, _ = likeliest_map(plain, rest)
-    if not (asked or foretells_other_passes(plain, rest, second)):
-        return state
-    if first.is_like(second):
-        second = first
-    else:
-        beside = look.again(replace(beside.data, position_map=second), beside.found.best)
     if asked:
         return beside
-    if below_the_input(plain, float(np.sqrt(np.mean(second.fitted_mm**2)))):
+    if not foretells_other_passes(plain, plain.judged(beside.found.best, beside.found.best.values), first):
+        return state
+    if below_the_input(plain, float(np.sqrt(np.mean(first.fitted_mm**2)))):
         # If a stage returns to the same positions, its encoder rounds them equally; these errors are no effect.
         return state
     # If effects explain the data and the map replaces none of them, the map only describes the inexactness of their
     # formulas.
     stays = found.unknown is None and set(found.best.names) <= set(beside.found.best.names)
     worse = found.unknown is None and beside.found.unknown is not None
-    return beside if not (stays or worse) and _gained(state, beside, second) > LEAST_GAIN else state
+    return beside if not (stays or worse) and _gained(state, beside, first) > LEAST_GAIN else state
 
 
 def _contested(state: Searched, reason: str) -> Searched:

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import ambiguity_set, beside_foretold
-from fingervision.diagnosis.inference.evidence import choices, detection_limits, follows_the_input, odds, speaks_for
+from fingervision.diagnosis.inference.evidence import detection_limits, follows_the_input, odds, speaks_for
 from fingervision.diagnosis.inference.explanation_candidates import (
     LEAST_GAIN,
     Progress,
@@ -16,19 +16,17 @@ from fingervision.diagnosis.inference.explanation_candidates import (
     extended,
     likeliest,
     pairs_in_time,
-    simplest,
     single_effects,
     swapped,
 )
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit, refit
-from fingervision.diagnosis.inference.model_adequacy import VERY_STRONG, imitated, remaining_structure
+from fingervision.diagnosis.inference.model_adequacy import imitated, remaining_structure
 from fingervision.diagnosis.inference.random_effect import FORM, PATH, estimated_coefficients
 from fingervision.diagnosis.inference.reference_gauge import consistent_with_gauges
 from fingervision.diagnosis.inference.search_state import NOISY, ROUGH, Findings, SearchState, beyond_form, noise_known
 from fingervision.diagnosis.inference.verdict import STANDING_SHARE, standing_of
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.domain.effect import Flags
 
 PAIRS_REFITTED = 60
 """Number of pairs that are refitted jointly, in the order of their signatures' gain: 27 effects have 351 pairs."""
@@ -67,7 +65,7 @@ def search(
     known : Explanation or None
         Explanation found by an earlier search of the same measurement, from whose residual the noise is estimated.
     """
-    state = _one_effect(replace(noise_known(problem_beside, known), known=known), forced)
+    state = _one_effect(noise_known(problem_beside, known), forced)
     progress(0.3)
     state = _two_effects(state, lambda share: progress(0.3 + 0.4 * share))
     state = _three_effects(state, lambda share: progress(0.7 + 0.1 * share))
@@ -79,20 +77,19 @@ def search(
 
 
 def _one_effect(state: SearchState, forced: frozenset[str]) -> SearchState:
-    """Fit every effect alone; keep the simplest effect that fits as well as the best, if its gain is significant."""
+    """Fit every effect alone; keep the likeliest, if its gain is significant."""
     problem = state.problem
-    alone = state.with_known(single_effects(problem, state.atoms, 20), 1)
-    singles = [e for e in alone if not follows_the_input(problem, e, state.nothing)]
+    singles = [e for e in single_effects(problem, state.atoms, 20) if not follows_the_input(problem, e, state.nothing)]
     state = replace(state, singles=singles)
     if not singles:
         return state
     stalled = [e for e in singles if set(e.names) & state.problem.stalled]
     if stalled and stalled[0].score < state.nothing.score:
         near = [e for e in stalled if e.score - stalled[0].score < LEAST_GAIN]
-        return replace(state, best=simplest(near, state.nothing), peers=singles)
+        return replace(state, best=likeliest(near), peers=singles)
     if not (speaks_for(problem, singles, state.nothing) or forced):
         return state
-    return replace(state, best=simplest(singles[:LIKELIEST], state.nothing), peers=singles)
+    return replace(state, best=likeliest(singles[:LIKELIEST]), peers=singles)
 
 
 def _two_effects(state: SearchState, progress: Progress) -> SearchState:
@@ -100,7 +97,7 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
     if not state.best.names:
         return state
     problem, singles = state.problem, state.singles
-    pairs = state.with_known(extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress), 2)
+    pairs = extended(problem, state.atoms, singles[:BASES], PAIRS_REFITTED, progress)
     if pairs and _leaves_structure(state, pairs[0]):
         pairs = best_each([*pairs, *pairs_in_time(problem, state.atoms, singles)])
     if _leaves_structure(state, singles[0]):
@@ -127,7 +124,7 @@ def _three_effects(state: SearchState, progress: Progress) -> SearchState:
     problem, pairs = state.problem, state.pairs
     bases = different(problem, pairs, PAIRS_EXTENDED)
     tried = extended(problem, state.atoms, bases, TRIPLES_REFITTED, progress, scanned=ROUGH)
-    triples = [e for e in state.with_known(tried, 3) if not follows_the_input(problem, e, state.best)]
+    triples = [e for e in tried if not follows_the_input(problem, e, state.best)]
     state = replace(state, triples=triples)
     clear = [e for e in triples[:LIKELIEST] if beyond_form(state, state.best, e)]
     if not speaks_for(problem, clear, state.best):
@@ -223,14 +220,6 @@ def _indistinguishable(
     return ambiguity_set(state.problem, state.best, state.nothing, pool, pairs)
 
 
-QUIET = 3.0 * 2.0**0.5
-"""Deficit of chi-square relative to the number of rows n, in units of sqrt(n), above which the assumed noise was too
-large: three standard deviations sqrt(2 n) of chi-square."""
-MOST_REPEATS = 2
-"""Largest number of repeated searches with a smaller noise: with the right effects, the estimate of the noise hardly
-changes any more."""
-
-
 def problem_of(data: Observations, explanation: Explanation | None) -> Problem:
     """Estimation problem whose noise is estimated from an explanation's residual, or else from the disagreement."""
     if explanation is None:
@@ -265,55 +254,12 @@ class Look:
 
     def again(self, data: Observations, known: Explanation | None = None) -> Searched:
         """Search once more, with the noise estimated from the residual of the effects found so far."""
-        look = partial(search, partial(problem_of, data), self.forced, self.progress)
-        found = look(known)
-        if _fits_far_better(data, found):
-            found = look(found.nearest)
-        for _ in range(MOST_REPEATS):
-            if not _noise_is_too_large(found):
-                break
-            found = look(found.best)
+        found = search(partial(problem_of, data), self.forced, self.progress, known)
         small = found.unknown is not None and standing_of(data, found).share > PART_OF_UNKNOWN
         if small and not self.forced & set(found.best.names):
             found = replace(found, best=found.nothing, alternatives=())
         found, said = consistent_with_gauges(data, found)
         return Searched(data, found, said)
-
-
-def _fits_far_better(data: Observations, found: Findings) -> bool:
-    """Whether an explanation that was not accepted is far more probable, each with the noise of its own residual.
-
-    If the noise is estimated from the residual of too few effects, the missing effect counts as correlated noise, and
-    its gain cannot exceed this noise. Therefore the likelihoods are compared with each explanation's own noise, with
-    the penalties of BIC (Schwarz 1978) and for the choice among all explanations. For example, a play of seven standard
-    deviations in 60 rows beside an offset gained only 65 in chi-square over a drift.
-    """
-    nearest, best, problem = found.nearest, found.best, found.problem
-    if not nearest.names or nearest.names == best.names or nearest.bic > best.score:
-        return False
-    if data.measured_pure_errors(np.split(problem.whitener.aside, len(data.channels))) is not None:
-        return False
-    (own, own_rows), (other, other_rows) = _likelihood_cost(data, nearest), _likelihood_cost(data, best)
-    same_rows = bool(np.array_equal(own_rows, other_rows))
-    return same_rows and other - own + choices(problem, best) - choices(problem, nearest) > VERY_STRONG
-
-
-def _likelihood_cost(data: Observations, explanation: Explanation) -> tuple[float, Flags]:
-    """BIC of an explanation with the noise of its own residual, and the rows that were set aside for it."""
-    problem = problem_of(data, explanation)
-    again = refit(problem, explanation)
-    _, determinant = problem.whitener.columns(problem.measured[:, None])
-    return again.bic + determinant, problem.whitener.aside
-
-
-def _noise_is_too_large(found: Findings) -> bool:
-    """Whether the result leaves a residual far smaller than the noise by which it was judged.
-
-    The noise is estimated from the residual of a rough first fit. If the first fit is poor, its errors count as
-    correlated noise, and a second effect cannot be found because the assumed noise is too large.
-    """
-    rows = found.problem.rows
-    return bool(found.best.score < rows - QUIET * rows**0.5)
 
 
 def refitted(state: Searched) -> Searched:

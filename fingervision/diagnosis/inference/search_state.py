@@ -4,12 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from fingervision.diagnosis.inference.explanation_candidates import (
-    best_each,
     extended,
     single_effects,
 )
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, SMALL_SHARE, Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import refit
 from fingervision.diagnosis.inference.model_adequacy import shapes_of
 from fingervision.diagnosis.inference.probe_basis import Probes
 from fingervision.diagnosis.inference.signatures import Signatures, changes, signatures
@@ -19,7 +17,7 @@ NOISY = 2.0 * 2.0**0.5
 standard deviations sqrt(2 n)."""
 ROUGH = 2
 """Number of starts, and of explanations refitted thoroughly, in a first search whose only purpose is to estimate the
-noise. If its fit is poor, the chi-square of the result shows this, and the search is repeated (`searched.QUIET`)."""
+noise."""
 ROUGH_EFFECTS = 6
 """Number of effects that are fitted in it, in the order of their signatures' gain."""
 SHORT = 100
@@ -84,8 +82,6 @@ class SearchState:
         Generic shapes that are not in the catalogue.
     singles, pairs, triples : list of Explanation
         All explanations with one effect, and the most probable ones with two and three, best first.
-    known : Explanation or None
-        Explanation found by an earlier search of the same measurement.
     imitation, unknown, left_over : str or None
         Description of a probe that effects only imitate; of structure that no effect explains; of remaining structure
         that is small.
@@ -100,22 +96,9 @@ class SearchState:
     singles: list[Explanation] = field(default_factory=list)
     pairs: list[Explanation] = field(default_factory=list)
     triples: list[Explanation] = field(default_factory=list)
-    known: Explanation | None = None
     imitation: str | None = None
     unknown: str | None = None
     left_over: str | None = None
-
-    def with_known(self, found: list[Explanation], count: int) -> list[Explanation]:
-        """Add the explanation of an earlier search, refitted with the present noise, if it has `count` effects.
-
-        With a smaller noise, minima of chi-square are narrower, and a search from signatures may miss the minimum that
-        was found before. For example, a delay with a speed limit that left only noise was replaced by a resonance that
-        left ten times as much.
-        """
-        known = self.known
-        if known is None or len(known.names) != count or not set(known.names) <= set(self.problem.effects):
-            return found
-        return best_each([*found, refit(self.problem, known)])
 
 
 def noise_known(problem_beside: Callable[[Explanation | None], Problem], known: Explanation | None) -> SearchState:

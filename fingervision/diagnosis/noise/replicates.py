@@ -187,8 +187,6 @@ FEWEST_STEPS = 8
 LEVELS = 4096
 """Assumed number of levels of a reading without visible digits: 12 bits, as in servo encoders and inexpensive
 converters."""
-ORDINARY_SIGMAS = 6.0
-"""Robust standard deviations beyond which a single visit is a gross error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -316,9 +314,9 @@ def pure_error(
     if trend <= TREND_SIGMAS and degrees - taken >= FEWEST_DEGREES:
         trend = max(trend, drift_sigmas(rest, cost, rows, rows.size - len(groups)))
     if trend <= TREND_SIGMAS or degrees - taken < FEWEST_DEGREES:
-        return PureError(_without_gross_errors(rest, degrees), degrees, trend, wandering(rest, rows))
-    sd_mm = _without_gross_errors(straight, degrees - taken)
-    return PureError(sd_mm, degrees - taken, trend, wandering(straight, rows))
+        straight, taken = rest, 0
+    degrees -= taken
+    return PureError(float(np.sqrt(straight @ straight / degrees)), degrees, trend, wandering(straight, rows))
 
 
 def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tuple[slice, ...]) -> tuple[Array, int]:
@@ -339,12 +337,6 @@ def _without_run_offsets(values: Array, groups: list[NDArray[np.intp]], runs: tu
     out = values.copy()
     out[rows] -= own[rows] @ zeros
     return out, int(rank)
-
-
-def _without_gross_errors(rest: Array, degrees: int) -> float:
-    robust = 1.4826 * float(np.median(np.abs(rest)))
-    kept = np.abs(rest) <= ORDINARY_SIGMAS * robust if robust > 0.0 else np.ones(rest.size, dtype=bool)
-    return float(np.sqrt(np.sum(rest[kept] ** 2) / max(1, degrees - int(np.sum(~kept)))))
 
 
 def resolution(values: Array) -> float:
