@@ -18,7 +18,7 @@ from fingervision.cli._model_figures import save_figure
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.numbers import with_uncertainty
 from fingervision.models.finite_element import FiniteElementGripper, MechanismPlate
-from fingervision.models.gripper_figures import label_of, unit_of
+from fingervision.models.gripper_figures import label_of, unit_of, with_unit
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import by_trust
 from fingervision.models.lumped import LumpedGripper, MechanismFrame
@@ -139,7 +139,7 @@ def _write(
         click.echo(json.dumps(rows, indent=2))
         return
     shown = [f"{n} [{number_unit(n)}]" for n in varied]
-    shown += [c if c.endswith("]") else f"{c} [{unit_of(c)}]" for c in columns]
+    shown += [with_unit(c) for c in columns]
     widths = [max(len(text), 10) for text in shown]
     click.echo("  ".join(f"{text:>{width}}" for text, width in zip(shown, widths, strict=True)))
     for row in table[:_MOST_ROWS_PRINTED].tolist():

@@ -22,7 +22,7 @@ from fingervision.domain.gripper import Gripper
 from fingervision.interface.argument_checks import one_of, path_of, speaks_python
 from fingervision.models.answer_figures import LINEAR, ModelFigures, Physics
 from fingervision.models.elastic_mechanism import MechanismState
-from fingervision.models.gripper_figures import gripper_figures, unit_of
+from fingervision.models.gripper_figures import gripper_figures, with_unit
 from fingervision.models.gripper_model import DrawnGripper
 from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model, disagreements, kinds, small_displacements_alone
@@ -467,7 +467,7 @@ def figures_csv(figures: Mapping[str, Figures]) -> str:
 def figures_text(name: str, figures: Mapping[str, Figures], *, digits: int = 5, least: int = 0) -> str:
     """Table of results: one row per quantity, one column per kind of model."""
     labels = list(dict.fromkeys(label for row in figures.values() for label in row))
-    shown = [label if label.endswith("]") else f"{label} [{unit_of(label)}]" for label in labels]
+    shown = [with_unit(label) for label in labels]
     width = max(least, *map(len, (*shown, name)))
     lines = [f"{name:<{width}}" + "".join(f"{kind:>18}" for kind in figures)]
     for label, words in zip(labels, shown, strict=True):

@@ -288,6 +288,12 @@ def unit_of(name: str) -> str:
     return _UNITS.get(name) or next((unit for end, unit in _ENDS.items() if name.endswith(end)), "1")
 
 
+def with_unit(name: str) -> str:
+    """Name of a characteristic number with its unit in brackets; a ratio has none."""
+    unit = unit_of(name)
+    return name if unit == "1" or name.endswith("]") else f"{name} [{unit}]"
+
+
 def label_of(name: str) -> str:
     """Axis label of a characteristic number: its name in words, a slash, and its unit."""
     unit = unit_of(name)

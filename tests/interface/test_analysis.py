@@ -10,6 +10,7 @@ from click.testing import CliRunner
 import fingervision as fv
 from fingervision.cli import cli
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
+from fingervision.interface.prediction import figures_text
 
 PAPER = Path(__file__).parents[2] / "sample_frames/paper_run"
 MEASURED, MODEL = PAPER / "measured.csv", PAPER / "gripper.csv"
@@ -208,3 +209,12 @@ def test_a_measurement_is_the_table_of_its_file(tmp_path: Path) -> None:
         assert np.array_equal(getattr(of_memory, name), getattr(of_file, name)), name
     assert of_memory.run_names == of_file.run_names
     assert of_memory.notes == of_file.notes
+
+
+def test_a_ratio_has_no_unit_in_a_table_of_figures() -> None:
+    words = figures_text("", {"frame": {"gap_mm": 8.5, "safety_factor": 2.0, "tip_mm [mm/N]": 0.1}})
+    assert [line.split()[:-1] for line in words.splitlines()[1:]] == [
+        ["gap_mm", "[mm]"],
+        ["safety_factor"],
+        ["tip_mm", "[mm/N]"],
+    ]
