@@ -120,6 +120,8 @@ def bending_of(mechanism: Mechanism) -> Bending | None:
     """Compute how the bodies of a drawing bend; None for a drawing that cannot be computed as it is driven."""
     try:
         model = MechanismFrame(mechanism)
+        if not model.stiffness_n_mm:  # a drive that bends nothing is refused here, as no input makes flexures yield
+            return None
         moved = model.driven.unit_by_drive * model.input_at_yield_mm
     except FingervisionError:
         return None

@@ -2,6 +2,7 @@
 bodies.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from fingervision.domain.body_poses import COVERED, DAMAGED, NOT_FOUND, OK
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
-from fingervision.measuring.body_outlines import Placement
+from fingervision.measuring.body_outlines import Placement, bending_of
 from fingervision.measuring.body_poses import BodyTracker
 from fingervision.measuring.drawing_placement import GivenPoint, by_points, by_silhouette, parse_point
 from fingervision.models.finite_element import MechanismPlate
@@ -62,6 +63,14 @@ def test_the_pose_of_a_body_that_bends_is_that_of_its_area() -> None:
     u_mrad = float(np.hypot(*(np.sqrt(pose.random[2, 2]) for pose in (rest, seen))))
     assert u_mrad < 0.03
     assert seen.angle_mrad - rest.angle_mrad == pytest.approx(lever.state(u).bodies["lever"].angle_mrad, abs=3 * u_mrad)
+
+
+def test_a_drawing_that_is_not_driven_is_followed_as_rigid_bodies() -> None:
+    drawn = read_mechanism(Path("fingervision/models/mechanisms/parallel_leaf_stage.toml"))
+    guided = replace(drawn.drives[0], across="held", turns="held")
+    along_a_rail = replace(drawn, fixed=(), slides=((drawn.fixed[0], "y"),), drives=(guided,))
+    assert bending_of(along_a_rail) is None
+    assert bending_of(drawn) is not None
 
 
 @pytest.mark.slow
