@@ -10,14 +10,26 @@ from fingervision.domain.parameter import Parameter
 PER_PERIOD = 4.0
 """Rows on each period, so that it is not mistaken for a longer one; also standard uncertainties of the input in each
 quarter of a period, so that the phase of every row is known."""
+ORDERS = (2, 3, 4, 5, 6, 7)
+"""Orders of the harmonics that accompany the first harmonic of a screw or resolver."""
 
 
 def act(input_mm: Array, history: History, values: Values) -> Array:
     """Apply the effect: add a position error that repeats with the period of the encoder's scale."""
     if values["amplitude_mm"] == 0.0:
         return input_mm
-    phase = 2.0 * np.pi * input_mm / values["period_mm"] + values["phase_rad"]
-    return input_mm + values["amplitude_mm"] * np.sin(phase)
+    turns = 2.0 * np.pi * input_mm / values["period_mm"]
+    wave = np.sin(turns + values["phase_rad"])
+    for order in ORDERS:
+        for name, harmonic in (("sin", np.sin), ("cos", np.cos)):
+            if f"{name}_{order}" in values:
+                wave = wave + values[f"{name}_{order}"] * harmonic(order * turns)
+    return input_mm + values["amplitude_mm"] * wave
+
+
+def inexact(values: Values) -> tuple[Values, ...]:
+    """Harmonics, as shares of the first: in a periodic curve without jumps they fall with the square of their order."""
+    return tuple({**values, f"{name}_{order}": 1.0 / order**2} for order in ORDERS for name in ("sin", "cos"))
 
 
 def narrow(history: History) -> tuple[Parameter, ...] | str:
@@ -47,6 +59,7 @@ EFFECT = DriveEffect(
         Parameter("phase_rad", "rad", -3.15, 3.15, "phase of the cyclic error", neutral=None, starts=4),
     ),
     narrow=narrow,
+    inexact=inexact,
     wave=("amplitude_mm", "period_mm"),
     demonstrated=True,
     act=act,

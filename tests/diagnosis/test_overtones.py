@@ -68,6 +68,19 @@ def test_an_error_with_many_harmonics_is_one_cyclic_error(tmp_path: Path) -> Non
     assert "harmonic of order 2" in report.remaining
 
 
+def test_a_harmonic_is_no_play_behind_a_wave_that_drives_back(tmp_path: Path) -> None:
+    # The wave is so steep that the stage moves back in every period: a play behind it looks like the harmonic.
+    u = 1.12835 + 0.0033978 * np.arange(429)
+    angle = 2.0 * np.pi * u / 0.1107306 + 3.1707
+    off = 0.0363897 * (np.sin(angle) + 0.08 * np.sin(2.0 * angle + 1.0))
+    gap = 3.0 + u + off + 0.00185 * np.random.default_rng(SEED).standard_normal(u.size)
+    rows = [f"{0.1 * k},{u[k]},{gap[k]:.6f}" for k in range(u.size)]
+    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
+    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n0.9819258,3.9819258\n2.7290415,5.7290415\n")
+    report = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv")).report
+    assert report.alternatives == (("encoder_cyclic_error",),)
+
+
 @pytest.mark.slow
 def test_a_large_harmonic_is_told(tmp_path: Path) -> None:
     report = screwed(tmp_path, 0.6)

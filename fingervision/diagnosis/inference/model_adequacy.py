@@ -11,76 +11,48 @@ from fingervision.diagnosis.inference.evidence import SURELY, choices, jumps_ast
 from fingervision.diagnosis.inference.hypothesis import SMALL_SHARE, Explanation, Problem
 from fingervision.diagnosis.inference.map_identifiability import LINE_SHARE
 from fingervision.diagnosis.inference.probe_basis import Probes, probes
-from fingervision.diagnosis.inference.random_effect import evidence_of, normal_equations
+from fingervision.diagnosis.inference.random_effect import FORM, estimated_coefficients
 from fingervision.diagnosis.inference.signatures import tangents
 from fingervision.diagnosis.input.record_nuisances import below_the_input
 from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
 from fingervision.domain.effect import Array, Flags
-from fingervision.effects import catalogue
+from fingervision.effects.encoder_cyclic_error import ORDERS
 
-ORDERS = (2, 3, 4, 5, 6, 7)
-"""Orders of the harmonics that accompany the first harmonic of a screw or resolver."""
 LARGEST = 0.25
 """Ratio to the amplitude of the first harmonic above which another harmonic counts as a separate cause."""
 VERY_STRONG = 10.0
 """Threshold of very strong evidence on the scale of BIC (Kass & Raftery 1995)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Harmonics:
-    """Harmonics of a named cyclic error, and the part of the residual that they explain.
+@dataclass(frozen=True, slots=True)
+class Harmonic:
+    """The strongest harmonic of a named cyclic error: its order, its share of the first, and its period (mm)."""
 
-    Parameters
-    ----------
-    columns : ndarray of float, shape (m, k)
-        Whitened changes of the prediction, sine and cosine of each order.
-    fitted_mm : ndarray of float, shape (m,)
-        Change of the prediction by the harmonics.
-    words : str
-        Description of the strongest harmonic; empty if there are none.
-    """
+    order: int
+    share: float
+    period_mm: float
 
-    columns: Array
-    fitted_mm: Array
-    words: str = ""
+    @property
+    def words(self) -> str:
+        """Description of the harmonic."""
+        return f"the screw's harmonic of order {self.order}, {100.0 * self.share:.0f} % of its first"
 
 
-def harmonics(problem: Problem, best: Explanation) -> Harmonics:
-    """Fit the harmonics of a named cyclic error; none if they are not significant, or too large to belong to it.
-
-    Parameters
-    ----------
-    problem : Problem
-        Data and observation model.
-    best : Explanation
-        The named explanation.
-    """
-    rows = problem.measured.size
-    none = Harmonics(np.zeros((rows, 0)), np.zeros(rows))
-    periodic = [(name, effect.wave) for name, effect in catalogue().items() if name in best.names and effect.wave]
-    if not periodic:
-        return none
-    chain, history = problem.chain, problem.chain.history
-    name, wave_names = periodic[0]
-    amplitude_mm, period_mm = (best.values[name][key] for key in wave_names)
-    base = chain.stacked(best.values)
-    # The harmonics of a periodic curve without jumps fall with the square of their order.
-    sds = 1.0 / np.array(ORDERS) ** 2
-    waves = []
-    for order, sd in zip(ORDERS, sds.tolist(), strict=True):
-        phase = 2.0 * np.pi * order * history.input_mm / period_mm
-        for wave in (np.sin(phase), np.cos(phase)):
-            moved = chain.with_input(history.input_mm + sd * amplitude_mm * wave)
-            waves.append(moved.stacked(best.values) - base)
-    waves_mm = np.stack(waves, axis=1)
-    gram, aim = normal_equations(problem, best, waves_mm)
-    share = np.linalg.solve(gram + np.eye(aim.size), aim)
-    sizes = sds * np.hypot(share[0::2], share[1::2])
-    strongest = int(np.argmax(sizes))
-    if evidence_of(gram, aim) < VERY_STRONG or sizes[strongest] > LARGEST:
-        return none
-    words = f"the screw's harmonic of order {ORDERS[strongest]}, {100.0 * sizes[strongest]:.0f} % of its first"
-    return Harmonics(problem.whitener.columns(waves_mm)[0], waves_mm @ share, words)
+def strongest_harmonic(problem: Problem, best: Explanation) -> Harmonic | None:
+    """Find the strongest harmonic among the errors of the formulas; None if there is none of very strong evidence."""
+    errors, covariance = estimated_coefficients(problem, best, FORM)
+    begin, found = 0, list[tuple[float, Harmonic]]()
+    for name in best.names:
+        effect, values = problem.effects[name], best.values[name]
+        others = () if effect.inexact is None else effect.inexact(values)
+        if effect.wave is not None and errors.size >= begin + len(others):
+            for k, order in enumerate(ORDERS):
+                own = begin + 2 * k + np.arange(2)
+                told = float(errors[own] @ np.linalg.solve(covariance[np.ix_(own, own)], errors[own]))
+                share = float(np.linalg.norm(errors[own])) / order**2
+                found += [(share, Harmonic(order, share, values[effect.wave[1]] / order))] * (told > VERY_STRONG)
+        begin += len(others)
+    return max(found, key=lambda one: one[0])[1] if found and begin == errors.size else None
 
 
 LONG = 4000
@@ -213,8 +185,11 @@ def is_a_line(problem: Problem, shape: Array) -> bool:
 
 def remaining_structure(problem: Problem, shapes: Probes, best: Explanation) -> tuple[str | None, str | None]:
     """Test the largest gain among many probes; return unknown structure, or structure that is known to be small."""
-    own = harmonics(problem, best)
-    gain, dot, norm = _gains(problem, WhitenedColumns(shapes.columns, problem.offsets), best, own.columns)
+    own = strongest_harmonic(problem, best)
+    if own is not None and own.share > LARGEST:
+        return f"a wave over the input with a period of {own.period_mm:.3g} mm", None
+    none = np.zeros((problem.measured.size, 0))
+    gain, dot, norm = _gains(problem, WhitenedColumns(shapes.columns, problem.offsets), best, none)
     # A shape is one of many, and its size is fitted; the noise is as large as it may be.
     price = float(np.log(problem.rows)) + 2.0 * float(np.log(shapes.columns.shape[1]))
     threshold = price * float(np.exp(SURELY * noise_doubt(problem)))

@@ -254,7 +254,11 @@ class Look:
 
     def again(self, data: Observations, known: Explanation | None = None) -> Searched:
         """Search once more, with the noise estimated from the residual of the effects found so far."""
-        found = search(partial(problem_of, data), self.forced, self.progress, known)
+        look = partial(search, partial(problem_of, data), self.forced, self.progress)
+        found = look(known)
+        if data.form_errors_mm(found.best.values).shape[1] != dict(found.problem.random).get(FORM):
+            # The errors of the formulas are those of the effects that were found.
+            found = look(found.best)
         small = found.unknown is not None and standing_of(data, found).share > PART_OF_UNKNOWN
         if small and not self.forced & set(found.best.names):
             found = replace(found, best=found.nothing, alternatives=())

@@ -8,7 +8,6 @@ from scipy.special import fdtrc
 from fingervision.diagnosis.inference.held_out_prediction import rms_mm
 from fingervision.diagnosis.inference.hypothesis import Problem
 from fingervision.diagnosis.inference.measuring_chain import Settings
-from fingervision.diagnosis.inference.model_adequacy import harmonics
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.random_effect import FORM, estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
@@ -249,11 +248,11 @@ def standing_of(data: Observations, found: Findings) -> Standing:
 
 def form_error_mm(data: Observations, found: Findings) -> Array:
     """Estimated error of the formulas of the best explanation, as far as its kind is known; shape (m,) (mm)."""
-    error_mm, columns_mm = harmonics(found.problem, found.best).fitted_mm, data.form_errors_mm(found.best.values)
+    columns_mm = data.form_errors_mm(found.best.values)
     coefficients, _ = estimated_coefficients(found.problem, found.best, FORM)
-    if columns_mm.shape[1] == coefficients.size:
-        error_mm = error_mm + columns_mm @ coefficients
-    return np.asarray(error_mm, dtype=np.float64)
+    if columns_mm.shape[1] != coefficients.size:
+        return np.zeros(columns_mm.shape[0])
+    return np.asarray(columns_mm @ coefficients, dtype=np.float64)
 
 
 def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict, str | None]:

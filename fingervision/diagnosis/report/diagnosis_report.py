@@ -12,7 +12,7 @@ from fingervision.diagnosis.design.next_run import next_run
 from fingervision.diagnosis.inference.held_out_prediction import left_out_rms_mm, rms_mm
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.measuring_chain import Settings
-from fingervision.diagnosis.inference.model_adequacy import harmonics
+from fingervision.diagnosis.inference.model_adequacy import strongest_harmonic
 from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.search_state import Findings
@@ -275,6 +275,7 @@ def diagnosis_report(
     alternatives = tuple(_with_map(e.names, mapped=mapped) for e in members) or (((NAME,),) if mapped else ())
     proposal = next_run(data, found.problem, list(members[:MEMBERS_SEPARATED]), posterior, rng)
     mistaken = mistake is not None and mistake.blocks
+    harmonic = strongest_harmonic(found.problem, best)
     left = places(data, found.problem, answered.after_mm, np.random.default_rng(LOOKED_AT))
     runners_up = _runners_up(data, found)
     return DiagnosisReport(
@@ -289,7 +290,7 @@ def diagnosis_report(
         pure_error_mm=None if errors is None else errors[0].sd_mm,
         smallest_seen=found.smallest,
         unknown=unknown,
-        remaining=remaining(stands, found.left_over, harmonics(found.problem, best).words, best.sigma_mm),
+        remaining=remaining(stands, found.left_over, "" if harmonic is None else harmonic.words, best.sigma_mm),
         next_run=proposal,
         excluded=tuple({"name": name, "reason": reason} for name, reason in data.excluded.items()),
         outliers=outliers(data, found.problem, rows, answered.after_mm),
