@@ -87,8 +87,15 @@ def _why_closed(name: str, error: serial.SerialException) -> str:
     # A lock of another program is reported as EAGAIN; Windows reports "access denied" without a number.
     if error.errno in (errno.EAGAIN, errno.EBUSY) or "Could not exclusively lock" in str(error):
         holders = ", ".join(f"process {process}" for process in holders_of(name))
-        who = f"another program ({holders})" if holders else "another program"
-        return f"The port {name} must be free, but {who} has it open: close that program first."
+        if holders:
+            return (
+                f"The port {name} must be free, but another program ({holders}) has it open: close that program first."
+            )
+        # Two conversations on one line would take each other's answers.
+        return (
+            f"The port {name} must be free, but another program, or another part of this test bed, has it open: close "
+            "that program first, or give each part a port of its own."
+        )
     if error.errno in (errno.EACCES, errno.EPERM):
         return (
             f"The port {name} must be open to this user, but access was denied: join the group that owns it (on Debian "
