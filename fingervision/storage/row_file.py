@@ -156,7 +156,7 @@ def cell(value: float | None, places: int | None) -> str:
     """Format a number without trailing zeros, or with nine digits if no places are given; None is an empty string."""
     if value is None:
         return ""
-    return f"{value:.9g}" if places is None else f"{value:.{places}f}".rstrip("0").rstrip(".")
+    return f"{value:z.9g}" if places is None else f"{value:z.{places}f}".rstrip("0").rstrip(".")
 
 
 def quoted(text: str) -> str:
@@ -176,7 +176,7 @@ def table_text(header: Sequence[str], rows: Iterable[Sequence[object]], comment:
 
 def _shown(value: object, digits: int) -> object:
     if isinstance(value, float):
-        return f"{value:.{digits}g}" if isfinite(value) else ""
+        return f"{value:z.{digits}g}" if isfinite(value) else ""
     return "" if value is None else value
 
 

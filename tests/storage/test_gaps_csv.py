@@ -32,8 +32,10 @@ def test_the_header_is_the_formats(tmp_path: Path) -> None:
 def test_what_is_not_known_is_an_empty_cell(tmp_path: Path) -> None:
     with GapsCsv(tmp_path / "gaps.csv", ("run", "input_mm")) as table:
         table.add([GapRow(0, None, Status.TOUCHING), GapRow(1, 0.04, Status.OK, gap_mm=1.5, run="a,b", input_mm=0.0)])
+        table.add([GapRow(2, 0.08, Status.OK, gap_mm=-1e-9, input_mm=-0.0)])
     lines = (tmp_path / "gaps.csv").read_text().splitlines()
     assert lines[1] == "0,,touching" + "," * 19
+    assert lines[3] == "2,0.08,ok,0" + "," * 18 + "0"  # a zero without a sign
     assert lines[2] == "1,0.04,ok,1.5" + "," * 17 + '"a,b",0'
 
 
