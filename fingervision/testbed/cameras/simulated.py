@@ -109,19 +109,23 @@ class SimulatedCamera:
 
     def ready(self, within_s: float) -> bool:
         """Wait for the next frame, but no longer than a time; return whether it is there."""
+        # A camera keeps the newest frame alone.
+        while self._times_s(later=1)[2] <= self._clock.now_s():
+            self._exposure += 1
         arrived_s, until_s = self._times_s()[2], self._clock.now_s() + within_s
         self._clock.wait_until(min(arrived_s, until_s))
         if arrived_s > until_s:
             return False
-        # A camera keeps the frame that it announces, however soon it is fetched.
+        # What it announces is there when it is fetched.
         self._announced = self._exposure
         return True
 
-    def _times_s(self) -> tuple[float, float, float]:
-        """Time stamp, exposure and arrival of the next frame."""
-        device_s = self._exposure / self._rate_hz
+    def _times_s(self, later: int = 0) -> tuple[float, float, float]:
+        """Time stamp, exposure and arrival of the next frame, or of one that many frames later."""
+        exposure = self._exposure + later
+        device_s = exposure / self._rate_hz
         exposed_s = self._own.bed_s(device_s)
-        rng = np.random.default_rng([self._seed, 4, abs(self._exposure)])
+        rng = np.random.default_rng([self._seed, 4, abs(exposure)])
         late_s = self.latency.least_s + self._jitter_s * float(rng.standard_exponential())
         return device_s, exposed_s, exposed_s + late_s
 
