@@ -1,11 +1,13 @@
 """A name must predict the half that it was not fitted to, and an answer always says what to do next."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fingervision.diagnosis.design.next_look import lacking, next_look
+from fingervision.diagnosis.diagnose import diagnose
 from fingervision.diagnosis.inference.held_out_prediction import fails_on_unseen_half, left_out_rms_mm
 from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.search import problem_of
@@ -17,6 +19,10 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.report import Verdict
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
+from fingervision.storage.measured_table import read_measured_table
+from fingervision.storage.model_toml import read_model
+from tests.benchmarks.hidden import rows
+from tests.benchmarks.hidden.table_cache import draw_table_of_row
 
 ROWS, NOISE_MM = 60, 0.002
 
@@ -80,3 +86,11 @@ def test_the_sentence_on_what_was_tried_names_what_explains_a_part() -> None:
     assert "backlash 68 %" in tried(parts)
     assert "drive_lag" not in tried(parts)
     assert "no single effect" in tried(parts[1:])
+
+
+def test_a_half_that_determines_nothing_refutes_nothing(tmp_path: Path) -> None:
+    # Half of this table leaves the radius of a large deflection open by its hundredfold.
+    draw_table_of_row(rows.ROWS["poor"], 1491, 0, tmp_path)
+    done = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "simulation.csv"))
+    assert done.report.verdict is Verdict.NAMED
+    assert done.report.alternatives == (("large_deflection",),)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
-from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.hypothesis_fit import derivatives, fit
 from fingervision.diagnosis.inference.random_effect import MAP, estimated_coefficients
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.input.observations import Observations
@@ -56,7 +56,7 @@ def left_out_rms_mm(data: Observations, problem: Problem, best: Explanation) -> 
         hidden = np.zeros(n, dtype=bool)
         hidden[run] = True
         rows = np.tile(hidden, before.size // n)
-        after[rows] = (data.stacked_mm - _predicted(data, problem, best, hidden))[rows]
+        after[rows] = (data.stacked_mm - _predicted(data, *_fitted_without(data, problem, best, hidden)))[rows]
     return rms_mm(before, n, history.both_edges), rms_mm(after, n, history.both_edges)
 
 
@@ -73,10 +73,10 @@ def fails_on_unseen_half(data: Observations, problem: Problem, explanation: Expl
         seen = np.tile(~hidden & ~problem.whitener.aside[:n], bare.size // n)
         if any(float(np.sum(one[seen] ** 2)) < LEVERAGE * float(np.sum(one**2)) for one in alone):
             continue
-        before, moved = _on_unseen(data, problem, explanation, hidden)
+        before, moved, doubt = _on_unseen(data, problem, explanation, hidden)
         old, new = float(np.sum(before**2)), float(np.sum((before - moved) ** 2))
         chance = BY_CHANCE * 2.0 * problem.whitener.noises[0].total_mm * float(np.linalg.norm(moved))
-        if new > WORSE**2 * old and new - old > chance:
+        if new > WORSE**2 * old and new - old > chance + BY_CHANCE**2 * doubt:
             rows = max(1, before.size)
             named = " and ".join(explanation.names)
             return (
@@ -98,20 +98,35 @@ def foretold(data: Observations, found: Findings) -> Findings:
     return replace(found, alternatives=(found.best, *kept)) if len(kept) < len(others) else found
 
 
-def _on_unseen(data: Observations, problem: Problem, explanation: Explanation, hidden: Flags) -> tuple[Array, Array]:
-    """Disagreement of the gap in hidden rows without effects, and its change by effects fitted to the other rows."""
-    bare, runs = data.chain.stacked({}), data.chain.history.runs
-    counted = hidden & ~problem.whitener.aside[: hidden.size]
-    moved = (_predicted(data, problem, explanation, hidden) - bare)[: hidden.size]
-    before = (data.stacked_mm - bare)[: hidden.size]
-    return _without_run_means(before, counted, runs), _without_run_means(moved, counted, runs)
+def _on_unseen(
+    data: Observations, problem: Problem, explanation: Explanation, hidden: Flags
+) -> tuple[Array, Array, float]:
+    """Disagreement of the gap in hidden rows without effects, and its change by effects fitted to the other rows.
+
+    Returned last is the sum of the variances of this change by what the other rows leave open: half of a table may
+    determine an effect so badly that its prediction says nothing about the other half, and refutes nothing.
+    """
+    bare, runs, n = data.chain.stacked({}), data.chain.history.runs, hidden.size
+    counted = hidden & ~problem.whitener.aside[:n]
+    rest, fitted = _fitted_without(data, problem, explanation, hidden)
+    moved = (_predicted(data, rest, fitted) - bare)[:n]
+    before = (data.stacked_mm - bare)[:n]
+    slopes = derivatives(problem, fitted)[:n][counted]
+    doubt = float(np.sum((slopes @ fitted.covariance) * slopes))
+    return _without_run_means(before, counted, runs), _without_run_means(moved, counted, runs), doubt
 
 
-def _predicted(data: Observations, problem: Problem, explanation: Explanation, hidden: Flags) -> Array:
-    """Prediction of all rows by effects, and by a map, that are fitted without some hidden rows; shape (m,)."""
+def _fitted_without(
+    data: Observations, problem: Problem, explanation: Explanation, hidden: Flags
+) -> tuple[Problem, Explanation]:
+    """Estimation problem without some hidden rows, and the explanation fitted to the others."""
     aside = problem.whitener.aside | np.tile(hidden, problem.whitener.aside.size // hidden.size)
     rest = problem.judged_by(replace(problem.whitener, aside=aside), data.aim_mm)
-    fitted = fit(rest, explanation.names, explanation.values, sigma_mm=explanation.sigma_mm, iterations=STEPS)
+    return rest, fit(rest, explanation.names, explanation.values, sigma_mm=explanation.sigma_mm, iterations=STEPS)
+
+
+def _predicted(data: Observations, rest: Problem, fitted: Explanation) -> Array:
+    """Prediction of all rows by effects, and by a map, that were fitted without some hidden rows; shape (m,)."""
     predicted = data.chain.stacked(fitted.values)
     curve = data.position_map
     if curve is None:
