@@ -118,11 +118,13 @@ def _camera_of(frames: Sequence[Frame], settings: Settings, scale: Scale | None)
         # The steps of light lie elsewhere under another response.
         again = replace(settings, camera=camera)
         seen = [look[0] for frame, _ in looks if (look := steps_alone(frame, again)) is not None]
+        if not seen:  # a response under which these frames show no gap is not theirs
+            return replace(before, roughness=rough)
     if polarities == {False} or (are_dark and is_other):
         beside = learnt_beside(seen, camera.response, top, coding, are_dark=are_dark)
         rivals_px = camera.beside.u_gap_px if camera.beside is not None and not camera.beside.name else 0.0
         camera = replace(camera, beside=less_sure(beside, rivals_px))
-    return replace(camera, usual=_usual(seen)) if seen else camera
+    return replace(camera, usual=_usual(seen))
 
 
 def _usual(seen: Sequence[Seen]) -> tuple[tuple[float, float], ...]:

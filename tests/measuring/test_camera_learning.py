@@ -11,10 +11,11 @@ from calib.camera_response import standard_response
 from fingervision.domain.camera import Origin, stated_camera
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
+from fingervision.domain.gap import GapMeasurement
 from fingervision.measuring.camera_learning import camera_beside, camera_of, learnt_first
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX
-from tests.benchmarks.unknown_cameras import CLASSES, PX_PER_MM, Film, Recording, drawn
+from tests.benchmarks.unknown_cameras import CLASSES, PX_PER_MM, SURFACES, Film, Recording, drawn
 
 SETTINGS = Settings(BELOW_PX, Direction.UP)
 SCALE = BareScale(PX_PER_MM)
@@ -77,6 +78,14 @@ def test_a_camera_that_sharpens_is_not_corrected_and_said(recording: Recording) 
     assert camera.response.curve.name == "linear"
     assert "sharpen" in camera.response.words
     assert "three widths" in camera.response.words
+
+
+def test_a_response_under_which_no_frame_has_a_gap_is_not_taken() -> None:
+    film = CLASSES["linear-h264"](drawn(1_402_001, 24, SURFACES["glare"]))
+    frames, camera = learnt_first(film, SETTINGS, SCALE)
+    assert camera.response.curve is SETTINGS.camera.response.curve
+    first = next(iter(frames))
+    assert isinstance(measure_frame(first, replace(SETTINGS, camera=camera)), GapMeasurement)
 
 
 def test_a_stated_response_is_kept(recording: Recording) -> None:
