@@ -193,6 +193,7 @@ def check(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
 
     from fingervision.domain.errors import LimitError
     from fingervision.storage.recipe_toml import read_recipe
+    from fingervision.testbed.motion.move_limits import ENDLESS_N
     from fingervision.testbed.run.recipe_check import CheckedStep, check_recipe, planned_bed
 
     def line(step: CheckedStep) -> str:
@@ -232,7 +233,7 @@ def check(recipe_toml: Path, bed_name: str, as_json: bool) -> None:
         if 0.0 < settling_s < float("inf"):
             click.echo(f"each motion may take longer by up to {settling_s:g} s (settling_s)")
         speed = "any speed" if limits.speed_mm_s == float("inf") else f"{limits.speed_mm_s:g} mm/s"
-        force = "any force" if limits.force_n == float("inf") else f"{limits.force_n:g} N"
+        force = "any force" if limits.force_n >= ENDLESS_N else f"{limits.force_n:g} N"
         click.echo(
             f"limits of the test bed: {limits.lower_mm:g} to {limits.upper_mm:g} mm, {speed}, {force}, "
             f"gap at least {limits.gap_mm:g} mm"

@@ -8,8 +8,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.storage.drive_csv import read_samples
+from fingervision.storage.recipe_toml import read_recipe
+from fingervision.testbed.motion.move_limits import SoftLimits
+from fingervision.testbed.run.plan import plan
 from fingervision.testbed.run.recipe_check import planned_bed
 from tests.testbed.board_bed import CONTRACT_STEPS, written_bed
 
@@ -119,3 +122,13 @@ def test_a_recipe_with_a_screw_turned_by_hand_is_checked(tmp_path: Path) -> None
     done = check(tmp_path, TRIANGLE.format(to_mm=1.0, speed=0.5), "--bed", str(tmp_path / "bed.toml"))
     assert done.exit_code == 0, done.output
     assert "inf" not in done.output
+
+
+def test_a_force_limit_that_a_recipe_does_not_state_is_that_of_the_bed(tmp_path: Path) -> None:
+    step, weak = '[[step]]\nkind = "move"\nto_mm = 0.1\nspeed_mm_s = 1.0\n', SoftLimits(-1.0, 1.0, force_n=2.0)
+    path = tmp_path / "recipe.toml"
+    path.write_text(f"schema = 1\n{step}", encoding="utf-8")
+    assert plan(read_recipe(path), weak, None, 0.0, 25.0, 10.0)
+    path.write_text(f"schema = 1\nbelow_force_n = 3.0\n{step}", encoding="utf-8")
+    with pytest.raises(DataError, match=r"below_force_n in line 2 .* limit of force, 2 N"):
+        plan(read_recipe(path), weak, None, 0.0, 25.0, 10.0)

@@ -6,6 +6,7 @@ from math import ceil
 from fingervision.domain.errors import FingervisionError, LimitError
 from fingervision.domain.model import Model
 from fingervision.domain.recipe import Recipe
+from fingervision.storage.recipe_toml import BELOW_FORCE_N
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.actuator import MoveCheck
 from fingervision.testbed.motion.move_limits import SLACK_MM, SoftLimits
@@ -50,7 +51,8 @@ def plan(
     DataError
         A step is beyond a limit, or not valid; the message names the line and the excess.
     """
-    if recipe.below_force_n > limits.force_n:
+    # The default demands nothing: the lower limit acts.
+    if recipe.below_force_n > limits.force_n and recipe.below_force_n != BELOW_FORCE_N:
         top = Section(recipe.steps[0].path, recipe.text, "", {})
         _beyond(top, "below_force_n", recipe.below_force_n, limits.force_n, "N", "force")
     legs: list[Leg] = []
