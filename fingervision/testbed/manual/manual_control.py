@@ -82,9 +82,9 @@ def jog(bed: Bed, speed_mm_s: float, for_s: float = inf, looking: Looking | None
     # A stored step that has begun runs to its end unless it is stopped in time.
     check_move(bed.limits, end_mm, abs(speed_mm_s))
     last_mm = end_mm - (WARNING_S * speed_mm_s if bed.actuator.has_steps else 0.0)
-    from_mm = bed.actuator.readings()[-1].value
+    looking = looking or partial(by_instruments, bed)
     # From beyond a limit of the gripper's, a jog may lead back.
-    keeps = not any(bed.limits.broken_at(from_mm, bed.model))
+    keeps = not any(bed.limits.broken_at(looking()[0], bed.model))
 
     def enough(at_mm: float) -> bool:
         is_beyond = copysign(1.0, speed_mm_s) * (at_mm - last_mm) >= 0.0
