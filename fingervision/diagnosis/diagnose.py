@@ -7,6 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_diagnosis import diagnose_with_bodies, without_places
+from fingervision.diagnosis.inference.clock_shift import beside_clock
 from fingervision.diagnosis.inference.explanation_candidates import Progress, single_effects
 from fingervision.diagnosis.inference.held_out_prediction import foretold
 from fingervision.diagnosis.inference.hypothesis import Point, Problem
@@ -16,7 +17,7 @@ from fingervision.diagnosis.inference.position_map import NAME, map_columns, set
 from fingervision.diagnosis.inference.posterior import beside_alternatives
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.random_effect_search import beside_gains, beside_map
-from fingervision.diagnosis.inference.record_errors import settled_with_records
+from fingervision.diagnosis.inference.record_errors import settled_with_records, with_clock_errors
 from fingervision.diagnosis.inference.search import Look, Searched, problem_of, refitted
 from fingervision.diagnosis.inference.search_state import ROUGH, Findings
 from fingervision.diagnosis.inference.signatures import signatures
@@ -79,7 +80,7 @@ def refitted_search(
         Called with the share of the work that is done.
     """
     look = Look(rng, forced, progress)
-    state = beside_turns(look.again(data), look)
+    state = beside_turns(beside_clock(look.again(data), look), look)
     likelier = likelier_interpolation(state.data, state.found.problem, state.found.best)
     if likelier is not state.data:
         state = look.again(likelier)
@@ -136,6 +137,7 @@ def _settled(state: Searched, look: Look) -> Refitted:
     """Estimate the map and the gains, and compute every parameter's posterior."""
     data, found = state.data, state.found
     best, posterior = settled_with_records(data, found.problem, found.best, look.rng)
+    best = with_clock_errors(data, found.problem, best)
     found = found.with_best(beside_alternatives(found.problem, best, found.alternatives))
     if data.position_map is not None:
         data = replace(data, position_map=data.position_map.refitted(found.problem, best))

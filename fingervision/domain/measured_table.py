@@ -70,6 +70,28 @@ class RecordedPath(ShortRepr):
     rows: NDArray[np.intp]
 
 
+@dataclass(frozen=True, slots=True)
+class FoundClock:
+    """Offset between the clocks of input and gap, and the play, as far as they were fitted to their common motion.
+
+    Parameters
+    ----------
+    u_s : float
+        Standard uncertainty of the offset; 0 if both have the same clock, or if no uncertainty is stated.
+    play_mm, u_play_mm : float
+        Play that was fitted together with the offset, and its standard uncertainty. It contains the errors of the log
+        between its rows, which a table with the input at each frame does not show.
+    """
+
+    u_s: float = 0.0
+    play_mm: float = 0.0
+    u_play_mm: float = 0.0
+
+
+ONE_CLOCK = FoundClock()
+"""Input and gap were recorded with the same clock."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MeasuredTable(ShortRepr):
     """Rows of a measured table that have a gap, run after run, each run sorted by time.
@@ -96,9 +118,8 @@ class MeasuredTable(ShortRepr):
         Reference slots of known width that were measured with the same camera.
     path : RecordedPath or None
         All rows with an input, including those without a gap; None if every row has a gap, or without times.
-    u_clock_s : float
-        Standard uncertainty (s) of the offset between the clocks of the input and the gap, if this offset was estimated
-        from the motion in this table; 0 if both have the same clock, or if no uncertainty is stated.
+    clock : FoundClock
+        What was found about the clocks of input and gap from the motion in this table.
     stamp_s : float
         Resolution (s) of the times at which the input was read from a log; 0 if input and gap were read together, or
         if the times are not rounded.
@@ -117,7 +138,7 @@ class MeasuredTable(ShortRepr):
     notes: tuple[str, ...] = ()
     slots: tuple[ReferenceSlot, ...] = ()
     path: RecordedPath | None = None
-    u_clock_s: float = 0.0
+    clock: FoundClock = ONE_CLOCK
     stamp_s: float = 0.0
     channels: Mapping[str, Channel] = field(default_factory=lambda: MappingProxyType({}))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError
-from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.measured_table import ONE_CLOCK, MeasuredTable
 from fingervision.frames.array_levels import what_it_is
 from fingervision.models.table import TableModel
 from fingervision.storage import drive_csv, measured_table, simulation_table
@@ -60,7 +60,7 @@ def measured_from_columns(table: Any) -> MeasuredTable:
     runs = ["" if _is_missing(run) else str(run) for run in columns["run"]] if "run" in columns else None
     table_in_memory = measured_table.measured_rows(Path("measured"), values, runs)
     # A columns.toml in the current folder does not apply to columns in memory.
-    return replace(table_in_memory, slots=(), u_clock_s=0.0, stamp_s=0.0)
+    return replace(table_in_memory, slots=(), clock=ONE_CLOCK, stamp_s=0.0)
 
 
 def simulation_from_columns(columns: Mapping[str, list[Any]]) -> TableModel:

@@ -7,7 +7,7 @@ import numpy as np
 
 from fingervision.domain.errors import UsageError
 from fingervision.domain.field import declared
-from fingervision.domain.measured_table import MeasuredTable
+from fingervision.domain.measured_table import ONE_CLOCK, FoundClock, MeasuredTable
 from fingervision.domain.needed_library import needed_library
 from fingervision.domain.status import Status
 from fingervision.interface.column_tables import measured_from_columns
@@ -64,7 +64,10 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
     shifts_px = [row.u_shift_px for row in found.rows if row.u_shift_px is not None]
     table = replace(table, notes=(*table.notes, *response_note(found.summary, shifts_px)))
     stamp_s = 0.0 if table.time_s is None else frame_resolution_s(table.time_s)
-    return replace(table, u_clock_s=clock.u_time_s if isinstance(clock, ClockOffset) else 0.0, stamp_s=stamp_s)
+    found_clock = ONE_CLOCK
+    if isinstance(clock, ClockOffset):
+        found_clock = FoundClock(clock.u_time_s, clock.play_mm, clock.u_play_mm)
+    return replace(table, clock=found_clock, stamp_s=stamp_s)
 
 
 def dataframe(found: MeasuredInMemory) -> "pd.DataFrame":

@@ -220,6 +220,8 @@ SHARP = 5.0
 """Ratio of the change of step in an interval to those in the neighbouring intervals, and to a row's uncertainty, above
 which there is a corner.
 """
+ON_A_ROW = 1e-3
+"""Distance of a corner from a row, in rows, below which it lies on the row."""
 BUMP = float(np.sqrt(30.0))
 """Factor of the parabola x (1 - x), which is zero at both rows, that gives an RMS of 1 between them."""
 STANDS = 0.1
@@ -318,7 +320,11 @@ def corners_between_rows(time_s: Array, input_mm: Array, u_mm: Array) -> list[Co
         (input_mm[k + 1] - input_mm[k] - speed[k + 1] * (time_s[k + 1] - time_s[k])) / np.where(apart, apart, 1.0),
         -1.0,
     )
-    isolated = (bend > SHARP * beside) & (bend > SHARP * u_mm[k]) & (met_s > 0.0) & (met_s < np.diff(time_s)[k])
+    # A difference of rounded numbers is no bend of the path.
+    bent = bend > SHARP * np.maximum(u_mm[k], np.spacing(np.max(np.abs(input_mm))))
+    # A row at the corner itself shows that the stage turned there.
+    share = met_s / np.diff(time_s)[k]
+    isolated = (bend > SHARP * beside) & bent & (share > ON_A_ROW) & (share < 1.0 - ON_A_ROW)
     return [
         Corner(
             row,

@@ -10,7 +10,7 @@ from typing import Any
 
 from fingervision.domain.camera import Origin
 from fingervision.domain.errors import FingervisionError
-from fingervision.domain.measured_table import ReferenceSlot
+from fingervision.domain.measured_table import ONE_CLOCK, FoundClock, ReferenceSlot
 from fingervision.storage.csv_columns import read_columns
 from fingervision.storage.plain_file import json_of
 from fingervision.storage.run_files import RUN
@@ -34,8 +34,8 @@ def measurement_beside(table: Path) -> Mapping[str, Any]:
     return optional_document(table.parent / SUMMARY) if table.name == GAPS else {}
 
 
-def u_clock_beside(table: Path) -> float:
-    """Standard uncertainty (s) of the offset between the clocks of gap and drive, from the summary beside a gaps.csv.
+def clock_beside(table: Path) -> FoundClock:
+    """What was found about the clocks of gap and drive, from the summary beside a gaps.csv.
 
     Parameters
     ----------
@@ -44,15 +44,21 @@ def u_clock_beside(table: Path) -> float:
 
     Returns
     -------
-    float
-        Standard uncertainty in s; 0 for any other table, or if the offset was given instead of estimated.
+    FoundClock
+        One clock for any other table, or if the offset was given instead of estimated.
     """
     try:
         settings = measurement_beside(table)["settings"]
-        found = float(settings["u_drive_time_s"]) if settings["drive_offset"] == "found" else 0.0
+        if settings["drive_offset"] != "found":
+            return ONE_CLOCK
+        # Summaries of older versions state no play.
+        u_s, *play = (
+            float(settings[name]) for name in ("u_drive_time_s", "drive_play_mm", "u_drive_play_mm") if name in settings
+        )
     except (ValueError, LookupError, TypeError):
-        return 0.0
-    return found if 0.0 < found < float("inf") else 0.0
+        return ONE_CLOCK
+    known = 0.0 < u_s < float("inf") and all(0.0 <= each < float("inf") for each in play)
+    return FoundClock(u_s, *play) if known else ONE_CLOCK
 
 
 def response_note(summary: Mapping[str, Any], shifts_px: Iterable[float]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from fingervision.diagnosis.diagnose import Diagnosis, diagnose
 from fingervision.diagnosis.report.figure_files import residual_figure
 from fingervision.diagnosis.report.report_page import report_page
 from fingervision.diagnosis.report.sentences import within_clock
+from fingervision.domain.measured_table import FoundClock
 from fingervision.domain.report import Place
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
@@ -82,7 +83,7 @@ def test_the_page_scales_to_the_rows_that_count_and_is_citable(folder: Path, fou
 def test_a_difference_is_laid_to_the_clocks_only_within_their_uncertainty(
     found: Diagnosis, late_s: float, u_s: float, said: bool
 ) -> None:
-    data = replace(found.data, table=replace(found.data.table, u_clock_s=u_s))
+    data = replace(found.data, table=replace(found.data.table, clock=FoundClock(u_s)))
     # The gap follows the input one to one, and the largest speed is 0.5 mm/s.
     size = late_s * 0.5
     ways: NDArray[np.float64] = np.array([1.0, -1.0])

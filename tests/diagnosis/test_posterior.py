@@ -13,6 +13,7 @@ from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.inference.record_errors import simulated_errors, with_record_errors
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.drive import DriveHistory
+from fingervision.domain.measured_table import FoundClock
 from fingervision.effects.play_operator import play
 from fingervision.interface.column_tables import measured_from_columns
 from fingervision.motion.clock.alignment import find_clock_offset
@@ -141,9 +142,25 @@ def test_a_play_beside_a_clock_found_from_the_same_motion_is_within_its_uncertai
     states = [drive_at(log, clock.log_time_s(at)) for at in film_s]
     rows = [(at, state.input_mm, gap) for at, state, gap in zip(film_s, states, gap_mm, strict=True) if state]
     columns = dict(zip(("time_s", "input_mm", "gap_mm"), np.array(rows).T.tolist(), strict=True))
-    table = replace(measured_from_columns(columns), u_clock_s=clock.u_time_s, stamp_s=1e-3)
+    table = replace(measured_from_columns(columns), clock=FoundClock(clock.u_time_s), stamp_s=1e-3)
     found = fv.diagnose(table, {"input_mm": [-0.5, 1.5], "gap_mm": [-2.66, 12.78]}).report
     assert [effect.name for effect in found.effects] == ["backlash"]
     width = found.effects[0].parameters["play_mm"]
     assert abs(width.value - 0.066) < 2.0 * width.u < 0.002
     assert found.disagreement.after_rms_mm < 2.0 * 5e-4
+
+
+@pytest.mark.parametrize("late_s", [-0.003, 0.0029])
+def test_a_play_seen_at_one_reversal_does_not_depend_on_the_offset_that_the_clock_states(late_s):
+    # A straight line in the offset does not hold over 3 ms: the play is taken up within two frames.
+    time_s = np.arange(0.8, 6.0, 0.04)
+    fine_s = np.arange(0.0, 6.0, 5e-4)
+    stands_mm = np.interp(fine_s, [0.0, 4.6, 6.0], [-0.225, 1.5, 0.975])
+    gap_mm = 1.2 + 7.72 * np.interp(time_s, fine_s, play(stands_mm, 0.03, -1.0))
+    gap_mm += np.random.default_rng(3).normal(0.0, 1.7e-3, time_s.size)
+    columns = {"time_s": time_s, "input_mm": np.interp(time_s - late_s, fine_s, stands_mm), "gap_mm": gap_mm}
+    table = replace(measured_from_columns({k: v.tolist() for k, v in columns.items()}), clock=FoundClock(0.0021))
+    found = fv.diagnose(table, {"input_mm": [-0.5, 1.6], "gap_mm": [-2.66, 13.552]}).report
+    assert [effect.name for effect in found.effects] == ["backlash"]
+    width = found.effects[0].parameters["play_mm"]
+    assert abs(width.value - 0.03) < 2.0 * width.u < 0.001

@@ -117,3 +117,10 @@ def test_halts_at_equal_distances_are_not_taken_for_the_lines_of_an_encoder():
     """
     read = drawn_recordings.draw(99001093).input_mm
     np.testing.assert_array_equal(on_lines(read, (slice(0, read.size),)), read)
+
+
+def test_a_corner_on_a_row_does_not_lie_between_rows_however_the_times_are_rounded():
+    time_s = np.round(np.arange(0.0, 6.0, 0.01), 2)
+    path = LogPath.of(DriveHistory(time_s, np.round(np.interp(time_s, [0.6, 4.6, 6.0], [0.0, 1.5, 0.975]), 6)))
+    assert path.parts.corner_s.size == 0
+    assert path.drive.input_mm.max() == pytest.approx(1.5)

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from fingervision.domain.drive import DriveHistory
+from fingervision.domain.measured_table import ONE_CLOCK, FoundClock
 from fingervision.motion.clock.alignment import find_clock_offset
 from fingervision.motion.clock.clock_offset import ClockOffset, NoClockOffset
-from fingervision.storage.beside import u_clock_beside
+from fingervision.storage.beside import clock_beside
 from tests.benchmarks import drawn_recordings
 
 SIGMAS = 3.5
@@ -173,14 +174,15 @@ def test_wrong_gaps_here_and_there_do_not_move_it():
 
 
 def test_the_uncertainty_is_read_from_the_summary_beside_a_table(tmp_path):
-    settings = {"drive_offset": "found", "u_drive_time_s": 0.0125}
+    found = FoundClock(0.0125, 0.03, 0.0004)
+    settings = {"drive_offset": "found", "u_drive_time_s": 0.0125, "drive_play_mm": 0.03, "u_drive_play_mm": 0.0004}
     (tmp_path / "summary.json").write_text(json.dumps({"settings": settings}))
-    assert u_clock_beside(tmp_path / "gaps.csv") == 0.0125
-    assert u_clock_beside(tmp_path / "other.csv") == 0.0
+    assert clock_beside(tmp_path / "gaps.csv") == found
+    assert clock_beside(tmp_path / "other.csv") == ONE_CLOCK
     (tmp_path / "summary.json").write_text(json.dumps({"settings": {**settings, "drive_offset": "given"}}))
-    assert u_clock_beside(tmp_path / "gaps.csv") == 0.0
+    assert clock_beside(tmp_path / "gaps.csv") == ONE_CLOCK
     (tmp_path / "summary.json").write_text("[")
-    assert u_clock_beside(tmp_path / "gaps.csv") == 0.0
+    assert clock_beside(tmp_path / "gaps.csv") == ONE_CLOCK
 
 
 @pytest.mark.slow

@@ -1,9 +1,10 @@
 """Uncertainty of estimates from errors of the recorded input, by simulated repetition of the recording."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fingervision.diagnosis.inference.hypothesis import START_VARIANCE, Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import derivatives, refit
@@ -20,6 +21,7 @@ from fingervision.diagnosis.noise.channel_noises import (
 )
 from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
+from fingervision.effects.play_operator import play
 from fingervision.motion.input_path import recorded
 from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
 from fingervision.motion.recursion import recursion
@@ -192,18 +194,9 @@ def with_record_errors(
     whitener = problem.whitener
     if not explanation.names or not (whitener.input_mm.any() or whitener.passing_mm.any()):
         return explanation
-    listed = problem.parameters(explanation.names)
-    columns = whitener.columns(derivatives(problem, explanation))[0]
-    smooth = np.array([not parameter.rugged for _, parameter in listed])
-    if not smooth.any():
+    estimator = _Estimator.of(problem, explanation)
+    if estimator is None:
         return explanation
-    columns = columns[:, smooth]
-    listed = [entry for entry, kept in zip(listed, smooth.tolist(), strict=True) if kept]
-    offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
-    bent = offsets.beside(columns, metric)
-    starts = np.array([parameter.run is not None for _, parameter in listed])
-    normal = columns.T @ bent + np.diag(np.where(starts, 1.0 / START_VARIANCE, 0.0))
-    estimate = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)[~starts] @ bent.T
     truth, input_mm = problem.chain.stacked(explanation.values), problem.chain.history.input_mm
     away = [
         whitener.one(truth - problem.chain.with_input(input_mm + error_mm).stacked(explanation.values))
@@ -211,17 +204,79 @@ def with_record_errors(
     ]
     if not away:
         return explanation
-    found = np.array(away) @ estimate.T
-    own = np.flatnonzero(smooth[[parameter.run is None for _, parameter in problem.parameters(explanation.names)]])
     covariance = explanation.covariance.copy()
-    known = np.diag(covariance)[own] > 0.0
     if assumed_mm:
-        every = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)[np.ix_(~starts, ~starts)]
-        assumed = np.mean((whitener.columns(np.stack(assumed_mm, axis=1))[0].T @ estimate.T) ** 2, axis=0)
-        left = np.sqrt(np.clip(1.0 - assumed / np.maximum(np.diag(every), 1e-300), LEAST_LEFT, 1.0))
+        own = estimator.own
+        assumed = np.mean((whitener.columns(np.stack(assumed_mm, axis=1))[0].T @ estimator.weights.T) ** 2, axis=0)
+        left = np.sqrt(np.clip(1.0 - assumed / np.maximum(estimator.variances, 1e-300), LEAST_LEFT, 1.0))
         covariance[np.ix_(own, own)] *= np.outer(left, left)
-    covariance[np.ix_(own[known], own[known])] += found[:, known].T @ found[:, known] / len(found)
-    return replace(explanation, covariance=covariance)
+    return estimator.with_errors(replace(explanation, covariance=covariance), np.array(away))
+
+
+def with_clock_errors(data: Observations, problem: Problem, explanation: Explanation) -> Explanation:
+    """Add what the play beside a clock leaves uncertain to the covariance of an explanation.
+
+    The clock was fitted to the log itself, whose errors between its rows, such as the rounding of an encoder or of a
+    reversal, are common to all frames of a stroke. A table with the input at each frame does not show them: of 24
+    simulated plays (`tests.benchmarks.clock --laboratory --plays --seed 7301`), 10 differed from the truth by more than
+    2 u. They act as a play that is wider or narrower by the uncertainty of the clock's play.
+    """
+    clock, history = data.table.clock, problem.chain.along.history
+    if clock.u_play_mm == 0.0 or not explanation.names:
+        return explanation
+    estimator = _Estimator.of(problem, explanation)
+    if estimator is None:
+        return explanation
+    narrow, wide = (
+        np.concatenate([play(history.input_mm[run], width_mm, 0.0) for run in history.runs])
+        for width_mm in (clock.play_mm, clock.play_mm + clock.u_play_mm)
+    )
+    lost_mm = (wide - narrow)[problem.chain.along.rows]
+    column = problem.chain.slope * np.tile(lost_mm, problem.chain.slope.size // lost_mm.size)
+    return estimator.with_errors(explanation, problem.whitener.one(column)[None, :])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Estimator:
+    """Linear estimate of the parameters of an explanation from the whitened measurement.
+
+    Parameters
+    ----------
+    weights : ndarray of float, shape (p, m)
+        Change of each parameter, start states excluded, per change of the whitened measurement.
+    variances : ndarray of float, shape (p,)
+        Variances of these parameters under the likelihood alone.
+    own : ndarray of int, shape (p,)
+        Places of these parameters in the covariance of the explanation.
+    """
+
+    weights: Array
+    variances: Array
+    own: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, problem: Problem, explanation: Explanation) -> "_Estimator | None":
+        """Linearise about an explanation; None if the prediction depends on every parameter discontinuously."""
+        listed = problem.parameters(explanation.names)
+        smooth = np.array([not parameter.rugged for _, parameter in listed])
+        if not smooth.any():
+            return None
+        columns = problem.whitener.columns(derivatives(problem, explanation))[0][:, smooth]
+        offsets, metric = problem.offsets, problem.offsets.metric(explanation.sigma_mm)
+        bent = offsets.beside(columns, metric)
+        starts = np.array([parameter.run is not None for _, parameter in listed])[smooth]
+        normal = columns.T @ bent + np.diag(np.where(starts, 1.0 / START_VARIANCE, 0.0))
+        inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)[~starts]
+        own = np.flatnonzero(smooth[[parameter.run is None for _, parameter in listed]])
+        return cls(inverse @ bent.T, np.diag(inverse[:, ~starts]), own)
+
+    def with_errors(self, explanation: Explanation, away: Array) -> Explanation:
+        """Add the mean square of the changes that whitened errors cause, shape (k, m); held parameters stay held."""
+        found, covariance = away @ self.weights.T, explanation.covariance.copy()
+        known = np.diag(covariance)[self.own] > 0.0
+        moved = self.own[known]
+        covariance[np.ix_(moved, moved)] += found[:, known].T @ found[:, known] / len(found)
+        return replace(explanation, covariance=covariance)
 
 
 def _assumed(problem: Problem, rng: np.random.Generator) -> list[Array]:

@@ -19,14 +19,22 @@ from fingervision.diagnosis.noise.noise_model import Noise, gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
 from fingervision.diagnosis.noise.run_offsets import RunOffsets
 from fingervision.diagnosis.noise.whitening import Whitener
-from fingervision.domain.effect import Array, Effect, Flags
+from fingervision.domain.effect import Array, Effect, Flags, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import PhysicalModel
+from fingervision.domain.response import Response
 from fingervision.effects import catalogue
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import FunctionModel
 from fingervision.motion.clock.noise import even_variance
-from fingervision.motion.input_path import NO_TURNS, UnseenTurns, input_path, turning_readings
+from fingervision.motion.input_path import (
+    NO_TURNS,
+    UnseenTurns,
+    input_path,
+    recorded,
+    turning_readings,
+    unseen_turns,
+)
 from fingervision.motion.recorded_input import RecordedInput
 
 FEWEST_EQUAL = 6
@@ -170,7 +178,7 @@ class Observations:
 
     def path_errors_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Change of the prediction per standard uncertainty of reversals, turning points and clock; shape (m, k)."""
-        parts = [clock_columns(self.chain, self.table.u_clock_s, values)]
+        parts = [clock_columns(self.chain, self.table.clock.u_s, values)]
         if self.turning is not None:
             parts.append(self.turning.columns_mm(self.chain, values))
         if self.turns.random:
@@ -320,6 +328,33 @@ class Observations:
         """Return the observations with other turning points between the rows (`UnseenTurns`); shape (reversals,)."""
         return self._along(self.turns.turned(short_by))
 
+    def later(self, by_s: float) -> "Observations":
+        """Return the observations with a stage that moved later by a given time: another offset of the clocks.
+
+        The input of each row is that of the path at the earlier time; beyond the ends of a run, the stage keeps its
+        speed. The corners between the rows are found anew.
+        """
+        record, along = self.recorded, self.chain.along.history
+        _, time_s, runs = recorded(self.table)
+        if time_s is None or along.time_s is None:
+            return self
+        along_mm = _later(along.input_mm, along, time_s, runs, by_s)
+        history = replace(self.chain.history, input_mm=along_mm[self.table.path_rows])
+        turns = unseen_turns(self.table, history, along_mm, commanded=record.commanded)
+        path = input_path(self.table, history, along_mm, commanded=record.commanded, turns=turns)
+        chain = replace(self.chain, history=history, path=path)
+        if self.chain.dynamics is not None:
+            there, answer = chain.along.history, self.chain.dynamics[1]
+
+            def shifted(values: Array) -> Array:
+                return _later(values, along, there.times, there.runs, by_s)
+
+            force_n = None if answer.force_n is None else shifted(answer.force_n)
+            answer = Response(shifted(answer.left_mm), shifted(answer.right_mm), force_n)
+            chain = replace(chain, dynamics=(there.times, answer))
+        moved = replace(record, smooth_mm=history.input_mm, along_mm=along_mm)
+        return replace(self, chain=chain, recorded=moved, turns=turns, turning=TurningErrors.of(history))
+
     def turn_columns_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Change of the stacked prediction per unit of each reversal's `short_by`; shape (m, reversals).
 
@@ -397,3 +432,28 @@ class Observations:
                 f"drawn as {number.value:g} +-{u:.2g}{far}."
             )
         return tuple(out)
+
+
+def _later(values: Array, along: History, time_s: Array, runs: tuple[slice, ...], by_s: float) -> Array:
+    """Values along a path, at given times of the same runs but later; beyond the ends of a run their slope continues.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (m,)
+        Values at the points of the path `along`.
+    along : History
+        The path.
+    time_s : ndarray of float, shape (n,)
+        Times at which the moved values are wanted, in `runs`.
+    by_s : float
+        Time by which the values are later.
+    """
+    out = np.empty(time_s.size)
+    for run, points in zip(runs, along.runs, strict=True):
+        at_s, known_s, known = time_s[run] - by_s, along.times[points], values[points]
+        out[run] = np.interp(at_s, known_s, known)
+        apart = np.flatnonzero(np.diff(known_s) > 0.0)
+        for end, k, outside in ((0, apart[:1], at_s < known_s[0]), (-1, apart[-1:], at_s > known_s[-1])):
+            slope = np.diff(known)[k] / np.diff(known_s)[k]
+            out[run] += np.where(outside, slope.sum() * (at_s - known_s[end]), 0.0)
+    return out

@@ -200,10 +200,10 @@ def _notes_on_input(table: MeasuredTable, recorded: RecordedInput) -> tuple[str,
 
 
 def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
-    if table.u_clock_s <= 0.0:
+    if table.clock.u_s <= 0.0:
         return ()
     return (
-        f"the clocks of input and pictures were synchronised by this motion itself (U = {2.0 * table.u_clock_s:.2g} s "
+        f"the clocks of input and pictures were synchronised by this motion itself (U = {2.0 * table.clock.u_s:.2g} s "
         "over the frames, k = 2): a constant lag is part of this offset, so that a lag is named only if it exceeds "
         "the offset's uncertainty.",
     )

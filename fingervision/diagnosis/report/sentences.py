@@ -280,7 +280,7 @@ def within_clock(places: Sequence[Place], data: Observations) -> tuple[Place, ..
     data : Observations
         Measurement and model.
     """
-    expanded_s = COVERAGE_FACTOR * data.table.u_clock_s
+    expanded_s = COVERAGE_FACTOR * data.table.clock.u_s
     if expanded_s == 0.0 or data.chain.history.time_s is None:
         return tuple(places)
     gap_mm_s = _gap_speed(data)
