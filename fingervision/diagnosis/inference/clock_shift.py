@@ -69,4 +69,10 @@ def _nearer(data: Observations, found: Findings) -> Observations | None:
     column = data.path_errors_mm(best.values)[:, 0]
     linear = float(estimated_coefficients(problem, best, PATH)[0][0])
     missed = alone.whitener.one(there.chain.stacked(values) - problem.chain.stacked(best.values) - linear * column)
-    return data.later(share * prior_s) if float(missed @ missed) > BENT else None
+    if float(missed @ missed) <= BENT:
+        return None
+    words = (
+        f"the offset between the clocks was fitted together with the effects: the stage moved {share * prior_s:+.2g} s "
+        "later than the table states."
+    )
+    return replace(data.later(share * prior_s), notes=(*data.notes, words))
