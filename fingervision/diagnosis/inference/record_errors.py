@@ -219,7 +219,9 @@ def with_clock_errors(data: Observations, problem: Problem, explanation: Explana
     The clock was fitted to the log itself, whose errors between its rows, such as the rounding of an encoder or of a
     reversal, are common to all frames of a stroke. A table with the input at each frame does not show them: of 24
     simulated plays (`tests.benchmarks.clock --laboratory --plays --seed 7301`), 10 differed from the truth by more than
-    2 u. They act as a play that is wider or narrower by the uncertainty of the clock's play.
+    2 u. They act as a play that is wider or narrower by the uncertainty of the clock's play. What the explanation loses
+    along straight lines between the frames may differ from the clock's play, along the log; the truth may lie anywhere
+    between the two.
     """
     clock, history = data.table.clock, problem.chain.along.history
     if clock.u_play_mm == 0.0 or not explanation.names:
@@ -227,12 +229,16 @@ def with_clock_errors(data: Observations, problem: Problem, explanation: Explana
     estimator = _Estimator.of(problem, explanation)
     if estimator is None:
         return explanation
-    narrow, wide = (
-        np.concatenate([play(history.input_mm[run], width_mm, 0.0) for run in history.runs])
+    narrow_mm, wide_mm = (
+        np.concatenate([play(history.input_mm[run], width_mm, 0.0) for run in history.runs])[problem.chain.along.rows]
         for width_mm in (clock.play_mm, clock.play_mm + clock.u_play_mm)
     )
-    lost_mm = (wide - narrow)[problem.chain.along.rows]
-    column = problem.chain.slope * np.tile(lost_mm, problem.chain.slope.size // lost_mm.size)
+    lost_mm = wide_mm - narrow_mm
+    apart_mm = problem.chain.driven_mm(explanation.values) - narrow_mm
+    around = lost_mm - lost_mm.mean()
+    apart = float(around @ (apart_mm - apart_mm.mean())) / max(float(around @ around), 1e-30)
+    size = np.hypot(1.0, apart / np.sqrt(3.0))
+    column = problem.chain.slope * np.tile(size * lost_mm, problem.chain.slope.size // lost_mm.size)
     return estimator.with_errors(explanation, problem.whitener.one(column)[None, :])
 
 
