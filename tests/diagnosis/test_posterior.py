@@ -21,6 +21,8 @@ from fingervision.motion.clock.clock_offset import ClockOffset
 from fingervision.motion.drive_at import drive_at
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
+from tests.benchmarks.clock import PLAY_ALONE, named_play
+from tests.benchmarks.drawn_recordings import draw
 
 EDGE_MM = 0.01
 SAMPLES = 240
@@ -164,3 +166,12 @@ def test_a_play_seen_at_one_reversal_does_not_depend_on_the_offset_that_the_cloc
     assert [effect.name for effect in found.effects] == ["backlash"]
     width = found.effects[0].parameters["play_mm"]
     assert abs(width.value - 0.03) < 2.0 * width.u < 0.001
+
+
+@pytest.mark.parametrize("seed", [7301002, 7301027], ids=["wander", "steps"])
+def test_the_errors_of_a_log_between_its_rows_belong_to_the_uncertainty_of_a_play(seed):
+    # Encoders of 4 and 11 um, rows at 40 and 19 Hz: the input at each frame does not show what they leave open.
+    one = draw(seed, **PLAY_ALONE)
+    drive = DriveHistory(one.log_s, one.input_mm)
+    width = named_play(one, drive, find_clock_offset(one.time_s, one.gap_mm, drive))
+    assert abs(width.value - one.kind.play_mm) < 2.0 * width.u < 0.02

@@ -234,9 +234,12 @@ def with_clock_errors(data: Observations, problem: Problem, explanation: Explana
         for width_mm in (clock.play_mm, clock.play_mm + clock.u_play_mm)
     )
     lost_mm = wide_mm - narrow_mm
+    rows = problem.chain.history
+    speed = np.concatenate([np.gradient(rows.input_mm[run], rows.times[run]) for run in rows.runs])
+    # Zero, scale and time of the input are free beside a clock that was found from the motion.
+    free = np.stack([lost_mm, np.ones_like(speed), rows.input_mm, speed], axis=1)
     apart_mm = problem.chain.driven_mm(explanation.values) - narrow_mm
-    around = lost_mm - lost_mm.mean()
-    apart = float(around @ (apart_mm - apart_mm.mean())) / max(float(around @ around), 1e-30)
+    apart = float(np.linalg.lstsq(free, apart_mm, rcond=None)[0][0])
     size = np.hypot(1.0, apart / np.sqrt(3.0))
     column = problem.chain.slope * np.tile(size * lost_mm, problem.chain.slope.size // lost_mm.size)
     return estimator.with_errors(explanation, problem.whitener.one(column)[None, :])
