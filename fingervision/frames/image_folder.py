@@ -164,27 +164,25 @@ class ImageFolder:
 
     def __iter__(self) -> Iterator[Frame | LostFrame]:
         """Read the images one by one."""
-        last_s: float | None = None
+        return map(self.frame, range(len(self.description.files)))
+
+    def frame(self, index: int) -> Frame | LostFrame:
+        """Read the image with a given number, from 0."""
+        file, time_s = self.description.files[index], self._time_s(index)
         size_px = (self.description.height_px, self.description.width_px)
-        for index, file in enumerate(self.description.files):
-            time_s = self._time_s(index)
-            if self.times_s is not None and time_s == last_s:
-                yield LostFrame(index, time_s, Status.DUPLICATE, "The frame has the same time as the previous frame.")
-                continue
-            last_s = time_s
-            try:
-                pixels = read_image(file)
-            except UnreadableImageError as error:
-                yield LostFrame(index, time_s, Status.DAMAGED, str(error))
-                continue
-            if pixels.shape[:2] == size_px:
-                yield Frame(pixels, index, time_s, _coding(file))
-            else:
-                words = (
-                    f"{file.name} has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording has "
-                    f"{size_px[1]}x{size_px[0]}."
-                )
-                yield LostFrame(index, time_s, Status.DAMAGED, words)
+        if self.times_s is not None and index and time_s == self.times_s[index - 1]:
+            return LostFrame(index, time_s, Status.DUPLICATE, "The frame has the same time as the previous frame.")
+        try:
+            pixels = read_image(file)
+        except UnreadableImageError as error:
+            return LostFrame(index, time_s, Status.DAMAGED, str(error))
+        if pixels.shape[:2] == size_px:
+            return Frame(pixels, index, time_s, _coding(file))
+        words = (
+            f"{file.name} has {pixels.shape[1]}x{pixels.shape[0]} pixels, but the recording has "
+            f"{size_px[1]}x{size_px[0]}."
+        )
+        return LostFrame(index, time_s, Status.DAMAGED, words)
 
     def _time_s(self, index: int) -> float | None:
         if self.times_s is not None:

@@ -1,6 +1,6 @@
 """Random access to a frame by its time, for display only; a series is never measured by random access."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Protocol
 
@@ -17,15 +17,31 @@ from fingervision.frames.video_file import upright, upright_steps
 # Largest number of frames that are decoded from a key frame to the wanted frame; beyond it, frames are counted from the
 # recording's start.
 MOST_FRAMES_TO_DECODE = 600
+# Number of a frame of which only the time is known.
+UNNUMBERED = -1
 # A frame at most this much later than the one before is reached by reading on.
 READ_ON_S = 1
+
+
+Passes = Callable[[Frame], None]
 
 
 class Seeking(Protocol):
     """A recording whose single frames can be accessed directly."""
 
-    def frame(self, index: int, time_s: float) -> Frame | None:
-        """Return the frame with exactly the given time; None if it does not exist or cannot be decoded alone."""
+    def frame(self, index: int, time_s: float, passes: Passes | None = None) -> Frame | None:
+        """Return the frame with exactly the given time; None if it does not exist or cannot be decoded alone.
+
+        Parameters
+        ----------
+        index : int
+            Number of the frame, from 0.
+        time_s : float
+            Its time (s).
+        passes : callable, optional
+            Called with each frame, without its number, that is decoded on the way from a key frame; what it raises ends
+            the way.
+        """
         ...
 
 
@@ -72,17 +88,17 @@ class VideoSeeking:
         self._pictures: Iterator[tuple[av.VideoFrame, Quantiser | None]] | None = None
         self._wanted = 0
 
-    def frame(self, index: int, time_s: float) -> Frame | None:
+    def frame(self, index: int, time_s: float, passes: Passes | None = None) -> Frame | None:
         """Return the frame with exactly the given time; None if it does not exist or cannot be decoded alone."""
         try:
-            found = self._found(index, time_s)
+            found = self._found(index, time_s, passes)
         except (av.FFmpegError, OSError, ValueError):
             found = None
         if found is None:
             self._close()
         return found
 
-    def _found(self, index: int, time_s: float) -> Frame | None:
+    def _found(self, index: int, time_s: float, passes: Passes | None) -> Frame | None:
         if self._container is None:
             self._container, self._pictures = open_container(self._name), None
             codec = self._container.streams.video[0].codec_context
@@ -96,12 +112,17 @@ class VideoSeeking:
             self._container.seek(self._wanted, stream=stream, backward=True)
             self._pictures = self._decoded(self._container, stream)
         for number, (picture, steps) in enumerate(self._pictures):
-            if picture.pts == self._wanted and not picture.is_corrupt:
-                hangs = self._coding is Coding.INTERFRAME and not picture.key_frame
-                pixels = upright(luma(picture), picture.rotation)
-                return Frame(pixels, index, time_s, self._coding, hangs, upright_steps(steps, picture))
             if number > MOST_FRAMES_TO_DECODE or picture.pts is None or picture.pts > self._wanted:
                 return None
+            if picture.is_corrupt or (passes is None and picture.pts != self._wanted):
+                continue
+            hangs = self._coding is Coding.INTERFRAME and not picture.key_frame
+            pixels = upright(luma(picture), picture.rotation)
+            if picture.pts == self._wanted:
+                return Frame(pixels, index, time_s, self._coding, hangs, upright_steps(steps, picture))
+            if passes is not None:
+                at_s = float(picture.pts * stream.time_base)
+                passes(Frame(pixels, UNNUMBERED, at_s, self._coding, hangs, upright_steps(steps, picture)))
         return None
 
     def _decoded(

@@ -18,17 +18,19 @@ import fingervision as fv
 from calib.calibration import BareScale
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
+from fingervision.frames import image_file, image_folder
 from fingervision.frames.frame_range import frame_range
-from fingervision.frames.seeking import frame_times_s
+from fingervision.frames.image_folder import ImageFolder
+from fingervision.frames.seeking import UNNUMBERED, frame_times_s
 from fingervision.frames.source import FrameSource, open_source
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
 from fingervision.live.comparison.comparison import Comparison
-from fingervision.live.playback.playback import FrameReader, Playback
+from fingervision.live.playback.playback import KEPT_BEFORE, FrameReader, OvertakenError, Playback
 from fingervision.live.playback.recorded import is_recording, recorded
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.calibration_json import read_calibration
-from tests.live.browser import browser, needs_chromium, opened, says, shown
+from tests.live.browser import browser, opened, says, shown
 from tests.waiting import until
 
 __all__ = ["browser", "opened"]
@@ -85,14 +87,14 @@ def test_every_frame_is_the_one_it_says_in_any_order(recordings: dict[str, Path]
     for wanted in order:
         # Asked for by its time where the table has one, and by counting.
         for time_s in (whole[wanted].time_s, None):
-            found = reader.at(wanted, lambda time_s=time_s: time_s)
+            found = reader.at(wanted, lambda _, time_s=time_s: time_s)
             assert isinstance(found, Frame)
             assert found.index == wanted
             assert number_in(found.pixels) == wanted
             np.testing.assert_array_equal(found.pixels, whole[wanted].pixels)
             reader._kept.clear()
-    assert reader.at(FRAMES, lambda: None) is None
-    assert isinstance(reader.at(3, lambda: None), Frame)
+    assert reader.at(FRAMES, lambda _: None) is None
+    assert isinstance(reader.at(3, lambda _: None), Frame)
 
 
 @pytest.mark.parametrize("name", CODINGS)
@@ -172,7 +174,7 @@ def test_frames_of_a_damaged_recording_are_counted_where_packets_do_not_number_t
 def test_a_time_that_no_frame_has_is_not_taken_for_a_neighbours(recordings: dict[str, Path]) -> None:
     source = open_source(str(recordings["h264.mp4"]))
     reader = FrameReader(lambda: iter(source), str(recordings["h264.mp4"]))
-    found = reader.at(40, lambda: 1.611)
+    found = reader.at(40, lambda _: 1.611)
     assert isinstance(found, Frame)
     assert number_in(found.pixels) == 40
 
@@ -181,14 +183,87 @@ def test_a_picture_that_was_put_back_is_read_again(recordings: dict[str, Path], 
     folder = tmp_path / "images"
     shutil.copytree(recordings["images"], folder)
     source = open_source(str(folder))
-    reader = FrameReader(lambda: iter(source), str(folder), are_files=True)
+    reader = FrameReader(lambda: iter(source), str(folder), source)
     third = source.description.files[3]
     third.rename(tmp_path / "away")
-    assert isinstance(reader.at(3, lambda: None), LostFrame)
+    assert isinstance(reader.at(3, lambda _: None), LostFrame)
     (tmp_path / "away").rename(third)
-    found = reader.at(3, lambda: None)
+    found = reader.at(3, lambda _: None)
     assert isinstance(found, Frame)
     assert number_in(found.pixels) == 3
+
+
+def test_an_image_is_read_without_those_before_it(recordings: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    source = open_source(str(recordings["images"]))
+    assert isinstance(source, ImageFolder)
+    read: list[Path] = []
+    monkeypatch.setattr(image_folder, "read_image", lambda file: read.append(file) or image_file.read_image(file))
+    reader = FrameReader(lambda: iter(source), str(recordings["images"]), source)
+    for wanted in (FRAMES - 1, 20, 50):
+        found = reader.at(wanted, lambda _: None)
+        assert isinstance(found, Frame)
+        assert number_in(found.pixels) == found.index == wanted
+    assert len(read) == 3
+    assert reader.at(FRAMES, lambda _: None) is None
+
+
+def test_frames_before_a_far_one_are_passed_kept_and_left_when_another_is_wanted(recordings: dict[str, Path]) -> None:
+    source = open_source(str(recordings["one_key.mp4"]))
+    whole = [item for item in source if isinstance(item, Frame)]
+    read = Counted(source)
+    reader = FrameReader(lambda: iter(read), str(recordings["one_key.mp4"]))
+
+    def time_of(index: int) -> float | None:
+        return whole[index].time_s
+
+    passed: list[Frame] = []
+    assert reader.at(40, time_of, passed.append) is not None
+    assert [number_in(frame.pixels) for frame in passed] == [*range(40)]
+    # To step back decodes nothing, and shows what the recording has there.
+    again: list[Frame] = []
+    for wanted in range(39, 39 - KEPT_BEFORE, -1):
+        found = reader.at(wanted, time_of, again.append)
+        assert isinstance(found, Frame)
+        assert (found.index, found.time_s) == (wanted, whole[wanted].time_s)
+        np.testing.assert_array_equal(found.pixels, whole[wanted].pixels)
+    assert not again
+
+    def overtaken(frame: Frame) -> None:
+        again.append(frame)
+        if len(again) == 5:
+            raise OvertakenError
+
+    reader._kept.clear()
+    with pytest.raises(OvertakenError):
+        reader.at(30, time_of, overtaken)
+    assert len(again) == 5
+    for wanted in (20, 55):
+        found = reader.at(wanted, time_of)
+        assert isinstance(found, Frame)
+        assert number_in(found.pixels) == wanted
+    assert read.read == 0
+
+
+def test_the_first_frame_of_a_long_way_is_shown_meanwhile_as_what_it_is(
+    recordings: dict[str, Path], tmp_path: Path
+) -> None:
+    view = Playback(recorded(str(recordings["one_key.mp4"]), None, Choices(), ()), tmp_path / "out")
+    frames = [replace(item, index=UNNUMBERED) for item in view.recorded.source if isinstance(item, Frame)]
+    view._times_s = frame_times_s(str(recordings["one_key.mp4"]))
+    view._times_read.set()
+    for wanted, shown_number in ((5, None), (40, 0)):
+        view.frame, view.seen = wanted, None
+        passes = view._on_the_way(wanted)
+        for frame in frames[:3]:
+            passes(frame)
+        if shown_number is None:
+            assert view.seen is None
+        else:
+            assert view.seen is not None
+            assert view.seen.frame.index == number_in(view.seen.frame.pixels) == shown_number
+    view.frame = 50
+    with pytest.raises(OvertakenError):
+        passes(frames[3])
 
 
 def test_a_range_has_the_numbers_of_the_whole() -> None:
@@ -325,7 +400,6 @@ def frames_of(measured: Path) -> list[int]:
 
 
 @pytest.mark.slow
-@needs_chromium
 def test_what_the_page_measures_is_what_the_command_gives(
     live: Callable[..., Any],
     opened: Callable[..., Any],

@@ -32,7 +32,9 @@ listen("now", (now) => {
   gap.dataset.frame = now ? String(now.frame) : "";
   say("frame_number", now ? String(now.frame) : "–");
   say("status", now ? now.status : "–", `badge ${now && now.status === "ok" ? "good" : "bad"}`);
-  say("why", now ? now.words : "");
+  // On a long way from a key frame, that is shown meanwhile, with its own value.
+  const wanted = state && state.playback && !state.playback.playing ? state.playback.frame : null;
+  say("why", !now ? "" : wanted === null || now.frame === wanted ? now.words : `Frame ${now.frame}, on the way to ${wanted}.`);
   at("unzero").hidden = !now || now.zero_mm === 0;
   if (now) say("unzero", `Zero off (${now.zero_mm.toFixed(4)} mm)`);
   const verdict = now ? now.verdict : "";

@@ -1,8 +1,10 @@
 """A recording in the browser page: display of frames while the recording is measured in the background."""
 
 from bisect import bisect_left
-from collections import Counter, OrderedDict
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from threading import Condition, Event, Thread
 from time import monotonic
@@ -12,8 +14,10 @@ from fingervision.domain.errors import DataError, LimitError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.own_process import in_own_process
 from fingervision.domain.status import Status
+from fingervision.frames.image_folder import ImageFolder
 from fingervision.frames.seeking import Seeking, frame_times_s, seeking
 from fingervision.live.choices import MOVES_ZERO
+from fingervision.live.frame_measurement import Seen
 from fingervision.live.playback.recorded import Recorded, recorded_frame
 from fingervision.live.playback.track import Track, arguments_of
 from fingervision.live.supervisor import told
@@ -29,8 +33,16 @@ from fingervision.storage.run_files import lost_frames
 KEPT_BYTES = 64_000_000
 # A frame at most this far ahead is reached by reading on, which is faster than seeking.
 NEAR_FRAMES = 12
+# Number of frames before a wanted one that are kept if they were decoded on the way.
+KEPT_BEFORE = 25
+# Largest difference of two times that are written alike (s).
+SAME_S = 0.6 * 10.0**-TIME_PLACES
 
 Item = Frame | LostFrame
+
+
+class OvertakenError(Exception):
+    """Another frame is wanted before the one that was asked for has been decoded."""
 
 
 class FrameReader:
@@ -45,20 +57,22 @@ class FrameReader:
         Function that starts reading the recording from its beginning.
     name : str
         Name of the recording.
-    are_files : bool
-        Whether every frame is a file of its own. A lost frame is then read again at each access, because a file that
-        was missing may be there again.
+    images : ImageFolder, optional
+        The recording, if every frame is a file of its own. A lost frame is then read again at each access, because a
+        file that was missing may be there again.
     """
 
-    def __init__(self, begin: Callable[[], Iterator[Item]], name: str, *, are_files: bool = False) -> None:
+    def __init__(self, begin: Callable[[], Iterator[Item]], name: str, images: ImageFolder | None = None) -> None:
         self._begin = begin
-        self._are_files = are_files
+        self._images = images
         self._items = begin()
         self._following = 0
         self._kept: OrderedDict[int, Item] = OrderedDict()
         self._seeking: Seeking | None = seeking(name)
 
-    def at(self, index: int, time_of: Callable[[], float | None]) -> Item | None:
+    def at(
+        self, index: int, time_of: Callable[[int], float | None], passes: Callable[[Frame], None] = lambda frame: None
+    ) -> Item | None:
         """Return the frame with a given number in the recording.
 
         Parameters
@@ -66,8 +80,11 @@ class FrameReader:
         index : int
             Number of the frame, from 0.
         time_of : callable
-            Function that returns the time of the frame (s), or None if it is not known surely or if a neighbouring
+            Function that returns the time of a frame (s), or None if it is not known surely or if a neighbouring
             frame has the same time. It is called only where the time is needed, and may wait for it.
+        passes : callable, optional
+            Called with each frame, without its number, that is decoded on the way from a key frame; what it raises ends
+            the way.
 
         Returns
         -------
@@ -82,13 +99,47 @@ class FrameReader:
         if index in self._kept:
             self._kept.move_to_end(index)
             return self._kept[index]
+        if self._images is not None:
+            if index >= len(self._images.description.files):
+                return None
+            image = self._images.frame(index)
+            if isinstance(image, Frame):
+                self._keep(image)
+            return image
         is_near = self._following <= index < self._following + NEAR_FRAMES
-        if not is_near and self._seeking is not None and (time_s := time_of()) is not None:
-            found = self._seeking.frame(index, time_s)
+        if not is_near and self._seeking is not None and (time_s := time_of(index)) is not None:
+            found = self._sought(self._seeking, index, time_s, time_of, passes)
             if found is not None:
-                self._keep(found)
                 return found
         return self._counted(index)
+
+    def _sought(
+        self,
+        source: Seeking,
+        index: int,
+        time_s: float,
+        time_of: Callable[[int], float | None],
+        passes: Callable[[Frame], None],
+    ) -> Frame | None:
+        """Decode a frame from the last key frame on, and keep those on the way: people step back."""
+        passed: deque[Frame] = deque(maxlen=KEPT_BEFORE)
+
+        def also_kept(frame: Frame) -> None:
+            passed.append(frame)
+            passes(frame)
+
+        found = source.frame(index, time_s, also_kept)
+        if found is None:
+            return None
+        before: list[Frame] = []
+        for number, frame in enumerate(reversed(passed), start=1):
+            at_s = time_of(index - number)
+            if at_s is None or frame.time_s is None or abs(at_s - frame.time_s) > SAME_S:
+                break
+            before.append(replace(frame, index=index - number, time_s=at_s))
+        for frame in (*reversed(before), found):
+            self._keep(frame)
+        return found
 
     def _counted(self, index: int) -> Item | None:
         if index < self._following:
@@ -102,8 +153,6 @@ class FrameReader:
         return None
 
     def _keep(self, item: Item) -> None:
-        if self._are_files and isinstance(item, LostFrame):
-            return
         self._kept[item.index] = item
         size = sum(each.pixels.nbytes for each in self._kept.values() if isinstance(each, Frame))
         while size > KEPT_BYTES and len(self._kept) > 1:
@@ -150,7 +199,7 @@ class Playback(View):
         self._reader = FrameReader(
             lambda: iter(marked(source, marks) if marks else source),
             opened.name,
-            are_files=self.description.kind == "images",
+            source if isinstance(source, ImageFolder) else None,
         )
         # Times from the packets, for frames that the table has not reached.
         self._times_s: list[float] = []
@@ -344,8 +393,9 @@ class Playback(View):
                 if self._shown == wanted:
                     self._changed.wait(LOOK_EVERY_S)
                     continue
-            self._show(frame, row)
-            self._shown = wanted
+            with suppress(OvertakenError):
+                self._show(frame, row)
+                self._shown = wanted
 
     def _follow_table(self) -> None:
         track = self._track
@@ -374,12 +424,14 @@ class Playback(View):
 
     def _show(self, frame: int, row: GapRow | None) -> None:
         try:
-            item = self._reader.at(frame, lambda: self._own_time(frame, row))
+            item = self._reader.at(frame, self._own_time, self._on_the_way(frame))
             self._refuse_missing(item, frame, row)
             if item is None:
                 item = LostFrame(frame, None, Status.DAMAGED, "The recording has no frame of this number.")
             self.seen = recorded_frame(item, row, self.choices, self.description)
             self.supervisor.clear(PLAYING)
+        except OvertakenError:
+            raise
         except Exception as error:  # a file that was changed or removed may make a decoder raise any error
             self.is_playing = False
             self.supervisor.alarm(
@@ -393,8 +445,29 @@ class Playback(View):
                 f"Frame {frame} of {self.recorded.name} must be there, because it was measured, but is not."
             )
 
-    def _own_time(self, frame: int, row: GapRow | None) -> float | None:
+    def _on_the_way(self, wanted: int) -> Callable[[Frame], None]:
+        """What is done with frames that are decoded before a wanted one: the first of a long way is shown meanwhile.
+
+        Its value is that of its own row. The way ends if another frame is wanted.
+        """
+        is_first = True
+
+        def passes(frame: Frame) -> None:
+            nonlocal is_first
+            if is_first and frame.time_s is not None:
+                number = self.frame_at(frame.time_s)
+                time_s = self._own_time(number)
+                if number + NEAR_FRAMES < wanted and time_s is not None and abs(time_s - frame.time_s) <= SAME_S:
+                    self.seen = Seen(replace(frame, index=number), None, self._row(number))
+            is_first = False
+            if self.frame != wanted:
+                raise OvertakenError
+
+        return passes
+
+    def _own_time(self, frame: int) -> float | None:
         """Time by which a frame is found (s); None without a picture, or if a neighbouring frame has the same time."""
+        row = self._row(frame)
         if row is None:
             self._times_read.wait()  # some seconds, while counting the frames of an hour would take minutes
             return self._told_time(frame)
