@@ -19,8 +19,7 @@ from fingervision.live.frame_measurement import Seen
 from fingervision.live.guard import POLICY_VIOLATION, WRITER
 from fingervision.live.page_words import page_json
 from fingervision.live.pen import Pen
-from fingervision.live.picture_watch import PictureWatch
-from fingervision.live.preview import Known, is_short, message, state_has_changed
+from fingervision.live.preview import Known, message, state_has_changed
 from fingervision.live.supervisor import sentence
 from fingervision.live.view import View
 
@@ -30,8 +29,9 @@ TRY_AGAIN_LATER, UNSUPPORTED_DATA = 1013, 1003
 MOST_OF_REASON = 100
 # Errors of a connection that its browser has ended.
 GONE = (WebSocketDisconnect, TimeoutError, OSError, RuntimeError)
-# Shortest time between two pictures, as a screen needs it; longest time between two states without a new picture.
-PREVIEW_EVERY_S, STATE_EVERY_S = 0.03, 0.2
+# Shortest time between two pictures: of 25 a second every second one, which eyes follow at half the processor time.
+# Longest time between two states without a new picture, and time between two looks for a new one.
+PREVIEW_EVERY_S, STATE_EVERY_S, LOOK_EVERY_S = 0.06, 0.2, 0.01
 # Time between two pictures while the measurement or the disk is too slow.
 PREVIEW_IN_A_HURRY_EVERY_S = 0.5
 # The connection of a page that does not acknowledge a state within this time is closed.
@@ -49,18 +49,14 @@ class PageSocket:
         WebSocket connection of the page, not yet accepted.
     view : View
         The live measurement or recording that is shown.
-    watch : PictureWatch
-        Notifies of new pictures.
     pen : Pen
         Administration of write access.
     steps : list
         List to which requested pictures of the measuring steps are appended.
     """
 
-    def __init__(
-        self, page: WebSocket, view: View, watch: PictureWatch, pen: Pen, steps: list[tuple[str, bytes]]
-    ) -> None:
-        self._page, self._view, self._watch, self._pen, self._steps = page, view, watch, pen, steps
+    def __init__(self, page: WebSocket, view: View, pen: Pen, steps: list[tuple[str, bytes]]) -> None:
+        self._page, self._view, self._pen, self._steps = page, view, pen, steps
         self._is_viewer = page.scope.get("role") != WRITER
         self._acknowledged = asyncio.Event()
         self.ending = False
@@ -99,15 +95,14 @@ class PageSocket:
         pictured_s = float("-inf")
         while not self.ending:
             asked_s = monotonic()
-            await self._watch.other_than(shown, STATE_EVERY_S)
+            while view.seen is shown and monotonic() - asked_s < STATE_EVERY_S:
+                await asyncio.sleep(LOOK_EVERY_S)
             seen = view.seen
             every_s = PREVIEW_IN_A_HURRY_EVERY_S if view.in_a_hurry else 0.0
             picture = seen if seen is not shown and monotonic() - pictured_s >= every_s else None
             if picture is not None:
                 pictured_s = monotonic()
-            what = (view, known, picture, self._about())
-            # A short message is composed here, because changing to another thread and back would take longer.
-            following = message(*what) if is_short(view, known) else await asyncio.to_thread(message, *what)
+            following = await asyncio.to_thread(message, view, known, picture, self._about())
             known = following.known
             shown = seen
             self._acknowledged.clear()

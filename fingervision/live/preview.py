@@ -30,8 +30,6 @@ STATE_FOR_S = 0.2
 COMPARED = ("model", "second")
 # Largest number of rows in one message.
 ROWS_AT_ONCE = 3000
-# Number of rows that can be converted to text within a millisecond.
-ROWS_IN_A_MOMENT = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,23 +199,6 @@ def page_file(view: Playback, frames: Sequence[int], folder: Path) -> str:
     told = [[each.number, each.name, each.words] for each in view.messages]
     rows = list(view.rows(0, view.row_count))
     return saved_page(folder, {"state": state, "points": points(view, rows), "messages": told}, pictures)
-
-
-def draw_beforehand(view: View) -> None:
-    """Render the picture for the next messages in advance, unless the measurement is too slow."""
-    seen = view.seen
-    if seen is not None and not view.in_a_hurry:
-        with view.supervisor.watching("Drawing the picture"):
-            _PICTURES.of(seen)
-
-
-def is_short(view: View, known: Known) -> bool:
-    """Whether the next message can be composed quickly: few rows, and no model to evaluate."""
-    return (
-        known.identity == view.identity
-        and view.row_count - known.rows < ROWS_IN_A_MOMENT
-        and not any(name in view.features for name in COMPARED)
-    )
 
 
 def state_has_changed() -> None:

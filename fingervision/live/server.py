@@ -9,6 +9,7 @@ import secrets
 import socket
 from contextlib import suppress
 from functools import cache
+from mimetypes import guess_type
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -27,7 +28,6 @@ from fingervision.live.commands.model import MODEL
 from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard, PatientProtocol
 from fingervision.live.page_socket import ONLY_LOOKS, TRY_AGAIN_LATER, PageSocket
 from fingervision.live.pen import Pen
-from fingervision.live.picture_watch import PictureWatch
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.second_recording import SECOND
 from fingervision.live.preview import coded, page_file
@@ -106,9 +106,9 @@ LAST = "live.js"
 
 
 @cache
-def files() -> frozenset[str]:
-    """Names of the files that the server delivers; any other name gives the error "not found"."""
-    return frozenset(path.name for path in PAGE.iterdir() if path.is_file() and path.name != "index.html")
+def files() -> dict[str, bytes]:
+    """The files that the server delivers, by name; any other name gives the error "not found"."""
+    return {path.name: path.read_bytes() for path in PAGE.iterdir() if path.is_file() and path.name != "index.html"}
 
 
 @cache
@@ -139,8 +139,9 @@ def bound(host: str, port: int) -> socket.socket:
         The port is in use, or the address is not of this machine.
     """
     try:
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listening = socket.socket(family, socket.SOCK_STREAM)
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        # With its protocol stated, asyncio lets a connection's answers leave at once; they waited 40 ms for each other.
+        listening = socket.socket(family, kind, protocol)
     except OSError as error:
         raise UsageError(f"--host must be an address of this machine, but is {host} ({error.strerror}).") from error
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -177,7 +178,7 @@ class Page:
         modules()
         self._view, self._listening = view, listening
         self._sockets: set[PageSocket] = set()
-        self._pen, self._watch = Pen(), PictureWatch(view)
+        self._pen = Pen()
         self._steps: list[tuple[str, bytes]] = []
         port = listening.getsockname()[1]
         tokens = {kept_token(view.out): WRITER, kept_token(view.out, VIEWER_FILE): VIEWER}
@@ -251,7 +252,7 @@ class Page:
         name = request.path_params["name"]
         if name not in files():
             return PlainTextResponse("There is no such file.", 404)
-        return FileResponse(PAGE / name)
+        return Response(files()[name], media_type=guess_type(name)[0])
 
     async def _gaps(self, request: Request) -> Response:
         try:
@@ -305,7 +306,7 @@ class Page:
                 TRY_AGAIN_LATER, f"At most {PAGES_AT_ONCE} browser pages may be open at once: close a page."
             )
             return
-        socket_of_page = PageSocket(page, self._view, self._watch, self._pen, self._steps)
+        socket_of_page = PageSocket(page, self._view, self._pen, self._steps)
         self._sockets.add(socket_of_page)
         try:
             await socket_of_page.serve()

@@ -2,8 +2,8 @@
 import { page, listen, say, sendBy, tell, token } from "/page/bus.js";
 import { draw } from "/page/picture_view.js";
 
-const AGAIN_AFTER_MS = 500, SILENT_MS = 1000;
-let socket = null, lastAt = 0, view = "", rows = 0, said = 0, goneAt = 0, fresh = true, drawing = false;
+const AGAIN_AFTER_MS = 500, SILENT_MS = 1000, UNSEEN_EVERY_MS = 1000;
+let socket = null, lastAt = 0, view = "", rows = 0, said = 0, goneAt = 0, fresh = true, busy = false;
 
 function connect() {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
@@ -62,12 +62,17 @@ async function take(buffer) {
   tell("state", head.state);
   if (!page.paused) {
     // The value is that of the picture beside it, or of a newer frame where only now and then one is sent.
-    drawing = true;
+    busy = true;
     if (buffer.byteLength > 4 + length) await draw(new Uint8Array(buffer, 4 + length), head.overlay);
-    drawing = false;
-    lastAt = performance.now();
+    busy = false;
     if (!page.paused) tell("now", head.now);
   }
+  if (document.hidden) { // nobody sees what would come: once a second will do
+    busy = true;
+    await new Promise((go) => { document.addEventListener("visibilitychange", go, { once: true }); setTimeout(go, UNSEEN_EVERY_MS); });
+    busy = false;
+  }
+  lastAt = performance.now();
   if (socket.readyState === WebSocket.OPEN) socket.send('{"do":"ack"}');
 }
 
@@ -78,7 +83,7 @@ function answer(reply) {
 }
 
 setInterval(() => {
-  if (drawing) return; // it is this browser that is slow, and the server waits for it
+  if (busy) return; // it is this browser that is slow, and the server waits for it
   if (!lastAt || !socket || socket.readyState !== WebSocket.OPEN) return;
   if (performance.now() - lastAt > SILENT_MS) {
     say("connection", "The live view does not answer.", "bad");
