@@ -258,14 +258,13 @@ class Prediction:
         if inside[0].run != self._run:
             self._run = inside[0].run
             self._path.clear()
-        self._path.extend((row.time_s or 0.0, row.input_mm or 0.0) for row in inside)
-        gap_mm = self._respond()[-len(inside) :]
-        # With more new rows than the stored path has, the first of them get no prediction.
-        for row, value in zip(inside[-len(gap_mm) :], gap_mm, strict=True):
+        path = [*self._path, *((row.time_s or 0.0, row.input_mm or 0.0) for row in inside)]
+        self._path.extend(path[-len(inside) :])
+        for row, value in zip(inside, self._respond(path)[-len(inside) :], strict=True):
             self._known[row.frame] = float(value)
 
-    def _respond(self) -> Array:
-        time_s, input_mm = (np.array(column) for column in zip(*self._path, strict=True))
+    def _respond(self, path: Sequence[tuple[float, float]]) -> Array:
+        time_s, input_mm = (np.array(column) for column in zip(*path, strict=True))
         if not self.model.effects:
             return np.asarray(self.model.base.respond(input_mm).gap_mm)
         history = History(
@@ -380,6 +379,7 @@ class Comparison:
         return {
             "path": str(self.path),
             "samples": self._total,
+            "recent": len(rows),
             "moved": self._moved,
             "input_mm": rows[-1].input_mm if rows else None,
             "mean_um": float(1e3 * residual.mean()) if residual.size else None,

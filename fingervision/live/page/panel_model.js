@@ -4,7 +4,7 @@ import { ask, at, download, listen, number, on, page, panel, say, submit, withTo
 panel("against", 'Model: <span id="model_residual" class="quiet"></span>', `
   <p id="verdict_words" role="status"></p>
   <ul id="verdict_effects"></ul>
-  <details id="verdict_why" hidden><summary>Why</summary><img id="verdict_picture" alt="Measured less predicted gap before and after the named effects"></details>
+  <details id="verdict_why" hidden><summary>Why</summary><p id="verdict_more"></p><img id="verdict_picture" alt="Measured less predicted gap before and after the named effects"></details>
   <p id="verdict_next" hidden></p>
   <div class="row"><button id="next_run" hidden>Run what would settle it</button><button id="verdict_report" hidden>Save the full report</button></div>
   <p id="model_words" class="quiet"></p>
@@ -32,17 +32,23 @@ const um = (value) => (value === null ? "–" : `${value.toFixed(1)} µm`);
 listen("state", ({ model, bed, whole }) => {
   at("against").hidden = !model;
   if (!model) return;
-  say("model_residual", model.rms_um === null ? "no residual yet" : `mean residual ${um(model.mean_um)}, RMS ${um(model.rms_um)}`);
+  const last = model.recent < model.samples ? `last ${model.recent}: ` : "";
+  say("model_residual", model.rms_um === null ? "no residual yet" : `${last}mean residual ${um(model.mean_um)}, RMS ${um(model.rms_um)}`);
   // Of a live view the newest row's; of a recording it would be the last row's, whichever frame is shown.
   const input = model.input_mm === null ? "The input is not known yet. " : whole ? "" : `Input ${model.input_mm.toFixed(4)} mm. `;
   say("model_words", `${input}${model.samples} samples against ${model.path}${model.band_um === null ? "" : `; U of one sample ${um(model.band_um)} (k = 2)`}.`);
   const { verdict } = model;
   const waits = model.busy ? "diagnose is at work…" : `A verdict needs 100 samples in motion, there and back: so far ${model.moved}.`;
-  say("verdict_words", verdict ? `${verdict.verdict}: ${verdict.sentence} (${verdict.rows} samples)${model.busy ? " – being judged anew" : ""}` : waits);
+  // The verdict is its first sentence; what the rest adds is said where one asks why.
+  const [first, ...rest] = verdict ? verdict.sentence.split(/(?<=\.) /) : [waits];
+  say("verdict_words", verdict ? `${verdict.verdict}: ${first}${model.busy ? " (being judged anew)" : ""}` : first);
   at("verdict_why").hidden = at("verdict_next").hidden = at("verdict_report").hidden = !verdict;
   if (verdict) {
     const recipe = verdict.next_run && !(bed && bed.movable) ? ` Its recipe: ${verdict.next_run}` : "";
     say("verdict_next", `What next: ${NEXT[verdict.verdict] || ""}${recipe}`);
+    say("verdict_more", [...rest, `From ${verdict.rows} samples.`].join(" "));
+    // Effects that explain only a part are no verdict.
+    at(verdict.verdict === "unknown" ? "verdict_more" : "verdict_words").after(at("verdict_effects"));
     picture();
   }
   const effects = verdict ? verdict.effects.map(([name, values]) => `${name}: ${values}`) : [];

@@ -34,5 +34,5 @@ listen("state", ({ second, is_saved: saved }) => {
   say("second_words", second.frame === null ? "" : `Frame ${second.frame}${second.time_s === null ? "" : `, ${second.time_s.toFixed(3)} s`}: ${gap}`);
   say("second_trouble", second.trouble);
   const same = second.own_settings ? `measured with settings of its own, ${second.px_per_mm === null ? "no scale" : `${second.px_per_mm.toFixed(3)} px/mm`}` : "measured with the same settings";
-  say("second_settings", `Dashed in the chart, ${same}; ${second.measured} of ${second.frames} frames so far. Below the chart: this recording less the one beside.`);
+  say("second_settings", `Dashed in the chart, ${same}; ${second.measured < second.frames ? `${second.measured} of ${second.frames} frames so far` : `${second.frames} frames`}. Below the chart: this recording less the one beside.`);
 });
