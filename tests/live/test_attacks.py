@@ -23,7 +23,7 @@ from fingervision.live.choices import Choices
 from fingervision.live.opening import opened as opened_source
 from fingervision.live.server import PAGE, Page, bound, files, index, kept_token
 from fingervision.live.session import Session
-from tests.live.browser import browser, needs_chromium, opened, shown
+from tests.live.browser import browser, opened, shown, typed
 from tests.waiting import until
 
 __all__ = ["browser", "opened"]
@@ -286,7 +286,6 @@ def test_the_page_has_no_script_of_its_own_and_the_policy_lets_none_in() -> None
 
 
 @pytest.mark.slow
-@needs_chromium
 def test_markup_in_a_name_is_text(live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path) -> None:
     import cv2
     import numpy as np
@@ -297,8 +296,7 @@ def test_markup_in_a_name_is_text(live: Callable[..., Any], opened: Callable[...
         cv2.imwrite(str(folder / f"{number}.png"), np.full((240, 320), 200, np.uint8))
     page = opened(live(folder, "--rate-hz", "10", "--port", "0").address)
     shown(page, "document.querySelector('#source').textContent.includes('<script>')")
-    page.fill("#px_per_mm", "10")
-    page.press("#px_per_mm", "Enter")
+    typed(page, "#px_per_mm", "10")
     shown(page, "Number(document.querySelector('#picture').dataset.shown) > 0")
     assert page.title() == "fingervision live"
     assert page.locator("#source *").count() == 0

@@ -23,7 +23,7 @@ from fingervision.live.preview import ROWS_AT_ONCE
 from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.testbed.bed_factory import open_bed
-from tests.live.browser import browser, opened, says, shown
+from tests.live.browser import browser, opened, says, shown, typed
 from tests.waiting import until
 
 __all__ = ["browser", "opened"]
@@ -173,11 +173,9 @@ def test_a_hidden_backlash_is_named_on_the_page_within_a_minute_of_motion(
     view = live("simulated", "--bed", "simulated", *hidden, "--port", "0")
     page = opened(view.address, viewport={"width": 1280, "height": 720})
     shown(page, "document.querySelector('#status').textContent === 'ok'")
-    page.fill("#bed_to", "9")
-    page.press("#bed_to", "Enter")
+    typed(page, "#bed_to", "9")
     says(page, "nothing was moved")
-    page.fill("#bed_recipe", "recipe.toml")
-    page.press("#bed_recipe", "Enter")
+    typed(page, "#bed_recipe", "recipe.toml")
     says(page, "Running there and back")
     shown(page, "document.querySelector('#verdict_effects').textContent.includes('backlash')")
     # Motion: the recipe's own 4 s and the way there, less than a minute.

@@ -25,7 +25,7 @@ from fingervision.live.commands.camera import CameraError
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
-from tests.live.browser import browser, needs_chromium, opened, shown
+from tests.live.browser import browser, opened, shown
 from tests.live.test_wrong_fields import TWENTY
 from tests.waiting import until
 
@@ -272,7 +272,6 @@ def test_a_driver_that_forgets_a_setting_says_so() -> None:
 
 
 @pytest.mark.slow
-@needs_chromium
 def test_the_page_sets_the_camera_and_refuses_beside_the_field(session: Session, opened: Callable[..., Any]) -> None:
     page = Page(session, bound("127.0.0.1", 0))
     end = Event()

@@ -26,7 +26,7 @@ from fingervision.live.playback.gauge_following import GaugesBeside, put_gauges_
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
 from tests.gauges.drawn import bar, drawn, half_plane, seen
-from tests.live.browser import browser, needs_chromium, opened, says, shown
+from tests.live.browser import browser, opened, says, shown, typed
 from tests.live.test_page_layout import findings
 from tests.waiting import until
 
@@ -290,7 +290,6 @@ def reads(page: Any, name: str, words: str) -> str:
 
 
 @pytest.mark.slow
-@needs_chromium
 def test_gauges_are_drawn_dragged_typed_and_saved_in_the_page(
     live: Callable[..., Any], opened: Callable[..., Any], frames: Path, tmp_path: Path
 ) -> None:
@@ -379,7 +378,6 @@ def test_gauges_are_drawn_dragged_typed_and_saved_in_the_page(
 
 
 @pytest.mark.slow
-@needs_chromium
 def test_the_panel_is_in_the_live_page_of_a_recording_and_costs_nothing_until_it_is_opened(
     live: Callable[..., Any], opened: Callable[..., Any], frames: Path
 ) -> None:
@@ -391,6 +389,5 @@ def test_the_panel_is_in_the_live_page_of_a_recording_and_costs_nothing_until_it
     page.locator("#gauge_hint", has_text="scale is not known").wait_for()
     page.locator("#gauge_new_name").press("Enter")
     page.locator("#gauge_list button").wait_for()
-    page.fill("#px_per_mm", "20")
-    page.press("#px_per_mm", "Enter")
+    typed(page, "#px_per_mm", "20")
     page.locator("#gauge_list .bad, #gauge_list .good").wait_for()

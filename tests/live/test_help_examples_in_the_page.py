@@ -14,7 +14,7 @@ import pytest
 
 from fingervision.interface.examples import copy_example
 from tests.cli.test_help_examples import ALL, words_of
-from tests.live.browser import browser, needs_chromium, opened, shown
+from tests.live.browser import browser, opened, shown
 from tests.live.conftest import NetworkCamera
 from tests.live.test_rtsp_camera import RtspCamera, rtsp_camera
 
@@ -29,7 +29,6 @@ SHOWN = "Number(document.querySelector('#picture').dataset.shown || 0)"
 
 
 @pytest.mark.slow
-@needs_chromium
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_an_example_runs_to_its_end_without_an_alarm(
     example: str, live: Callable[..., Any], tmp_path: Path, request: pytest.FixtureRequest

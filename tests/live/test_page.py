@@ -15,12 +15,11 @@ import pytest
 
 from fingervision.live.page_socket import STATE_EVERY_S
 from fingervision.live.session import SILENT_S
-from tests.live.browser import PATIENCE_MS, browser, drag, needs_chromium, opened, says, shown
+from tests.live.browser import PATIENCE_MS, browser, downloaded, drag, opened, says, shown, typed
 
 __all__ = ["browser", "opened"]
 from tests.waiting import until
 
-pytestmark = needs_chromium
 # What the page shows has four decimals, the table seven.
 SHOWN_MM = 0.00005
 BAR_PX, BAR_MM = 136, 4.0
@@ -52,21 +51,18 @@ def test_the_page_shows_records_and_saves(
     # What is shown is what the table holds.
     page.click("#pause")
     gap_mm, frame = float(page.inner_text("#gap_mm")), int(page.get_attribute("#gap_mm", "data-frame"))
-    with page.expect_download() as saved:
-        page.click("#save_csv")
-    table = {int(row["frame"]): row for row in csv.DictReader(io.StringIO(Path(saved.value.path()).read_text()))}
+    saved = downloaded(page, lambda: page.click("#save_csv"))
+    table = {int(row["frame"]): row for row in csv.DictReader(io.StringIO(saved.read_text()))}
     assert float(table[frame]["gap_mm"]) == pytest.approx(gap_mm, abs=SHOWN_MM)
     page.click("#pause")
 
-    with page.expect_download() as plot:
-        page.click("#save_plot")
-    assert cv2.imread(str(plot.value.path())).std() > 1.0
+    plot = downloaded(page, lambda: page.click("#save_plot"))
+    assert cv2.imread(str(plot)).std() > 1.0
 
     # Keyboard: record, and stop again.
     page.locator("body").press("r")
     shown(page, "document.querySelector('#record').textContent === 'Stop'")
-    page.fill("#below_tip", "0.4")
-    page.press("#below_tip", "Enter")
+    typed(page, "#below_tip", "0.4")
     says(page, "The settings of the measurement cannot be changed while a run is recorded")
     page.press("#below_tip", "Escape")
     shown(page, "/Recording: [3-9][0-9] frames/.test(document.querySelector('#recording').textContent)")
@@ -87,8 +83,7 @@ def test_the_page_shows_records_and_saves(
     assert names[:3] == ["grey", "denoised", "binary"]
 
     page.fill("#least", "0.5")
-    page.fill("#greatest", "5")
-    page.press("#greatest", "Enter")
+    typed(page, "#greatest", "5")
     page.locator("#verdict", has_text="pass").wait_for()
     page.click("#zero")
     page.locator("#unzero").wait_for()
@@ -146,11 +141,9 @@ def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
     # The simulated gripper moves between 1 and 4 mm.
     for least, greatest, verdict in (("5", "6", "fail"), ("0.5", "5", "pass")):
         page.fill("#least", least)
-        page.fill("#greatest", greatest)
-        page.press("#greatest", "Enter")
+        typed(page, "#greatest", greatest)
         page.locator("#verdict", has_text=verdict).wait_for()
-    page.fill("#least", "7")
-    page.press("#least", "Enter")
+    typed(page, "#least", "7")
     says(page, "The lower limit must be below the upper limit, but the limits are 7 and 5 mm.")
     page.press("#least", "Escape")
 
@@ -161,9 +154,8 @@ def test_the_chart_zooms_and_every_key_and_limit_does_what_it_says(
     page.locator("body").press("p")
     assert page.inner_text("#pause") == "Go on"
     shown_mm, frame = float(page.inner_text("#gap_mm")), int(page.get_attribute("#gap_mm", "data-frame"))
-    with page.expect_download() as saved:
-        page.click("#save_csv")
-    table = {int(row["frame"]): row for row in csv.DictReader(io.StringIO(Path(saved.value.path()).read_text()))}
+    saved = downloaded(page, lambda: page.click("#save_csv"))
+    table = {int(row["frame"]): row for row in csv.DictReader(io.StringIO(saved.read_text()))}
     assert float(table[frame]["gap_mm"]) - off_mm == pytest.approx(shown_mm, abs=2 * SHOWN_MM)
     page.wait_for_timeout(300)
     assert int(page.get_attribute("#gap_mm", "data-frame")) == frame
@@ -202,8 +194,7 @@ def test_a_scale_is_asked_for_and_found_on_a_reference(
     shown(page, "Number(document.querySelector('#picture').dataset.shown) > 2")
     page.click("#drag_reference")
     drag(page, (200, 100, 240, 280))
-    page.fill("#size_mm", str(BAR_MM))
-    page.press("#size_mm", "Enter")
+    typed(page, "#size_mm", str(BAR_MM))
     says(page, "Calibrated: ")
     (calibration,) = view.out.glob("calibration_*.json")
     found = json.loads(calibration.read_text())

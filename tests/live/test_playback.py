@@ -30,7 +30,7 @@ from fingervision.live.playback.playback import KEPT_BEFORE, FrameReader, Overta
 from fingervision.live.playback.recorded import is_recording, recorded
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.calibration_json import read_calibration
-from tests.live.browser import browser, opened, says, shown
+from tests.live.browser import browser, downloaded, opened, says, shown, typed
 from tests.waiting import until
 
 __all__ = ["browser", "opened"]
@@ -412,12 +412,11 @@ def test_what_the_page_measures_is_what_the_command_gives(
     view = live(moved, "--px-per-mm", "34", "--port", "0")
     page = opened(view.address, viewport={"width": 1280, "height": 720})
     shown(page, f"document.querySelector('#place').textContent === 'frame 0 of {FRAMES}'")
-    with page.expect_download() as saved:
-        page.locator("body").press("c")
-    assert Path(saved.value.path()).read_text() == measured(moved, "--px-per-mm", "34")
+    saved = downloaded(page, lambda: page.locator("body").press("c"))
+    assert saved.read_text() == measured(moved, "--px-per-mm", "34")
 
     # Step, scrub, and play: the value is the table's of the frame that is shown.
-    table = Path(saved.value.path()).read_text().splitlines()[1:]
+    table = saved.read_text().splitlines()[1:]
     gap_mm = [float(line.split(",")[3]) for line in table]
 
     def at_frame(number: int) -> None:
@@ -454,21 +453,18 @@ def test_what_the_page_measures_is_what_the_command_gives(
     assert json.loads((folder / "summary.json").read_text())["settings"]["frames"] == [26, 40]
 
     # Another height measures all of it anew.
-    page.fill("#below_tip", "0.5")
-    page.press("#below_tip", "Enter")
+    typed(page, "#below_tip", "0.5")
     page.press("#below_tip", "Escape")
     # The table of before is let go, and the new one grows.
     shown(page, "document.querySelector('#place').textContent.includes('measured')")
     shown(page, f"document.querySelector('#place').textContent === 'frame {FRAMES - 1} of {FRAMES}'")
-    with page.expect_download() as again:
-        page.locator("body").press("c")
-    other = Path(again.value.path()).read_text()
+    again = downloaded(page, lambda: page.locator("body").press("c"))
+    other = again.read_text()
     assert other == measured(moved, "--px-per-mm", "34", "--below-tip-mm", "0.5")
 
     # Taken away while it is looked at: said, and nothing else breaks.
     moved.rename(moved.with_suffix(".away"))
-    page.fill("#px_per_mm", "20")
-    page.press("#px_per_mm", "Enter")
+    typed(page, "#px_per_mm", "20")
     shown(page, "document.querySelector('#place').textContent.includes('There is no')")
 
 

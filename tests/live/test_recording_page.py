@@ -21,11 +21,11 @@ from fingervision.live.playback.recorded import recorded
 from fingervision.measuring.scale import stated_scale
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.calibration_json import read_calibration
-from tests.live.browser import browser, drag, needs_chromium, opened, says, shown
+from tests.live.browser import browser, downloaded, drag, opened, says, shown, typed
 from tests.live.conftest import serving
 
 __all__ = ["browser", "opened"]
-pytestmark = [needs_chromium, pytest.mark.slow]
+pytestmark = [pytest.mark.slow]
 FRAMES, RATE_HZ, PX_PER_MM = 40, 25.0, 34.0
 TIMES = "\N{MULTIPLICATION SIGN}"
 WIDEST, HIDDEN = 20, (28, 31)
@@ -65,11 +65,6 @@ def served(frames: Path, tmp_path: Path) -> Iterator[str]:
         view.start()
         yield page.address
         view.stop()
-
-
-def typed(page: Any, field: str, words: str) -> None:
-    page.fill(field, words)
-    page.press(field, "Enter")
 
 
 def is_at(page: Any, number: int) -> None:
@@ -232,9 +227,7 @@ def dragged(page: Any, chart: str, shares: tuple[float, float], *, shift: bool =
 
 
 def saved(page: Any, button: str) -> bytes:
-    with page.expect_download() as download:
-        page.click(button)
-    return Path(download.value.path()).read_bytes()
+    return downloaded(page, lambda: page.click(button)).read_bytes()
 
 
 def charts(page: Any) -> list[dict[str, float]]:

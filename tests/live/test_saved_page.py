@@ -16,12 +16,11 @@ from fingervision.live.choices import Choices
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
 from fingervision.rendering import Camera, render, two_fingers
-from tests.live.browser import browser, needs_chromium, shown
+from tests.live.browser import browser, downloaded, shown
 from tests.live.conftest import serving
-from tests.live.firefox import Firefox, firefox, needs_firefox
 from tests.waiting import until
 
-__all__ = ["browser", "firefox"]
+__all__ = ["browser"]
 FRAMES, RATE_HZ, PX_PER_MM, WIDEST = 30, 25.0, 34.0, 14
 PICTURES = (0, WIDEST, FRAMES - 1)
 # Markup in the name of a recording is text in the page.
@@ -66,7 +65,7 @@ def fetched(address: str, path: str) -> bytes:
 
 @pytest.fixture
 def page(saved: tuple[Path, list[dict[str, str]]], browser: Any) -> Iterator[Any]:
-    """The file in Chromium, which must ask for nothing but the file."""
+    """The file in a browser, which must ask for nothing but the file."""
     context, asked, errors = browser.new_context(viewport={"width": 1280, "height": 720}), [], []
     found = context.new_page()
     found.on("request", lambda each: asked.append(each.url))
@@ -79,7 +78,6 @@ def page(saved: tuple[Path, list[dict[str, str]]], browser: Any) -> Iterator[Any
     assert not [url for url in asked if not url.startswith(("data:", "blob:", saved[0].as_uri()))]
 
 
-@needs_chromium
 def test_saved_values_are_those_of_the_table_beside_the_picture_of_their_frame(
     page: Any, saved: tuple[Path, list[dict[str, str]]]
 ) -> None:
@@ -101,19 +99,6 @@ def test_saved_values_are_those_of_the_table_beside_the_picture_of_their_frame(
     assert page.get_attribute("#gap_mm", "data-frame") == str(WIDEST)
     assert page.title() != "1"
     assert NAME in page.inner_text("h1")
-    with page.expect_download() as download:
-        page.click("#save_seen")
-    seen = list(csv.DictReader(Path(download.value.path()).read_text(encoding="utf-8").splitlines()))
+    download = downloaded(page, lambda: page.click("#save_seen"))
+    seen = list(csv.DictReader(download.read_text(encoding="utf-8").splitlines()))
     assert [float(row["gap_mm"]) for row in seen] == pytest.approx([float(row["gap_mm"]) for row in rows], abs=1e-6)
-
-
-# Chromium shows the same value above.
-@pytest.mark.slow
-@needs_firefox
-def test_saved_page_is_shown_by_firefox(firefox: Firefox, saved: tuple[Path, list[dict[str, str]]]) -> None:
-    firefox.open(saved[0].as_uri())
-    firefox.shown("document.querySelector('#picture').dataset.shown > 0")
-    firefox.press("\ue010")  # End
-    firefox.shown(f"document.querySelector('#gap_mm').dataset.frame === '{FRAMES - 1}'")
-    found = float(firefox.evaluate("document.querySelector('#gap_mm').textContent"))
-    assert found == pytest.approx(float(saved[1][FRAMES - 1]["gap_mm"]), abs=6e-5)

@@ -17,7 +17,7 @@ from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
 from fingervision.live.playback.second_recording import SecondRecording, beside_recording
 from fingervision.rendering import Camera, render, two_fingers
-from tests.live.browser import browser, needs_chromium, opened, shown
+from tests.live.browser import browser, opened, shown, typed
 from tests.live.conftest import serving
 from tests.waiting import until
 
@@ -106,7 +106,6 @@ def test_a_second_recording_is_refused_where_it_cannot_be_shown(
         cli.main(["live", *given], standalone_mode=False)
 
 
-@needs_chromium
 def test_page_shows_both_recordings_and_where_they_differ_most(
     views: tuple[Playback, SecondRecording], opened: Callable[..., Any]
 ) -> None:
@@ -123,6 +122,5 @@ def test_page_shows_both_recordings_and_where_they_differ_most(
         shown(page, "Number(document.querySelector('#gap_mm').dataset.frame) >= 26")
         shown(page, "Number(document.querySelector('#gap_mm').dataset.frame) <= 32")
         shown(page, "document.querySelector('#readout').textContent.includes('difference')")
-        page.fill("#second_offset", "nonsense")
-        page.press("#second_offset", "Enter")
+        typed(page, "#second_offset", "nonsense")
         shown(page, "document.querySelector('#shift_form + .refused').textContent !== ''")

@@ -28,7 +28,7 @@ from fingervision.live.playback.recorded import recorded
 from fingervision.live.server import Page
 from fingervision.live.session import Session
 from fingervision.live.supervisor import Supervisor
-from tests.live.browser import browser, needs_chromium, opened, shown
+from tests.live.browser import browser, opened, shown
 from tests.live.conftest import serving
 from tests.live.test_attacks import closing_code, reply, socket_of
 from tests.waiting import until
@@ -233,7 +233,6 @@ def playing_failed(view: Playback) -> None:
 
 
 @pytest.mark.slow
-@needs_chromium
 @pytest.mark.parametrize(
     ("fault", "is_healthy"),
     [

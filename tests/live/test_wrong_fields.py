@@ -25,7 +25,7 @@ from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.settings_toml import read_settings
-from tests.live.browser import browser, needs_chromium, opened, says, shown
+from tests.live.browser import browser, opened, says, shown, typed
 from tests.live.test_attacks import reply, socket_of
 
 __all__ = ["browser", "opened"]
@@ -228,7 +228,6 @@ DROP = """name => {
 }"""
 
 
-@needs_chromium
 @pytest.mark.slow
 def test_a_dropped_file_leaves_the_page_where_it_is_and_a_second_page_is_told_who_writes(
     live: Callable[..., Any], opened: Callable[..., Any]
@@ -246,8 +245,7 @@ def test_a_dropped_file_leaves_the_page_where_it_is_and_a_second_page_is_told_wh
     # The first to do something works the view; to open the panel of the gauges is such a thing already.
     unfold = "for (const one of document.querySelectorAll('#panels details')) one.open = true"
     page.evaluate(unfold)
-    page.fill("#size_mm", "2")
-    page.press("#size_mm", "Enter")
+    typed(page, "#size_mm", "2")
     other = opened(view.address)
     shown(other, "document.querySelector('#looks_on').offsetParent")
     other.evaluate(unfold)

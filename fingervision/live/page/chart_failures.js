@@ -25,6 +25,8 @@ export function drawFailures(chart) {
   ink.strokeStyle = ink.fillStyle = colour("--bad");
   ink.lineWidth = ratio;
   ink.font = `${11 * ratio}px system-ui, sans-serif`;
+  ink.textAlign = "left"; // the axes leave theirs
+  ink.textBaseline = "alphabetic";
   for (const run of failures(min, max)) {
     const from = chart.valToPos(run.from, "x", true) - 2 * ratio, to = chart.valToPos(run.to, "x", true) + 2 * ratio;
     ink.strokeRect(from, foot - high, to - from, high - ratio);
