@@ -1,4 +1,4 @@
-"""Recognition of fingervision's own tables: those that are read literally, and those with several rows per frame."""
+"""Recognition of fingervision's own tables: those that are read literally, and those that cannot be what is wanted."""
 
 from pathlib import Path
 
@@ -29,6 +29,25 @@ def refuse_long_table(raw: RawTable) -> None:
                 f"{raw.path} must have one row per frame, but is {what}: give the gaps.csv of the same folder, which "
                 "with --drive holds the poses of bodies as columns."
             )
+
+
+GAPS = ("time_s", "status", "gap_mm", "gap_px")
+"""Columns by which a gaps.csv is recognised."""
+
+
+def refuse_gaps_without_input(raw: RawTable) -> None:
+    """Refuse a gaps.csv that was measured without the record of the input, which none of its columns can replace.
+
+    Raises
+    ------
+    DataError
+        The table is a gaps.csv.
+    """
+    if {column.name for column in raw.columns}.issuperset(GAPS):
+        raise DataError(
+            f"{raw.path} must have a column input_mm, the recorded input of every frame, but was measured without: "
+            "measure the recording again with --drive TABLE, the stage's record with times and positions."
+        )
 
 
 OWN = {"measured": ("input_mm", "gap_mm"), "drive": ("time_s", "input_mm"), "simulation": ("input_mm", "gap_mm")}

@@ -23,7 +23,7 @@ from fingervision.tables.doubts import (
     wrong_unit,
 )
 from fingervision.tables.mapping import Entry
-from fingervision.tables.own_format import refuse_long_table
+from fingervision.tables.own_format import refuse_gaps_without_input, refuse_long_table
 from fingervision.tables.questions import OpenQuestionError, Question, Reading, asked, span
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import clock_leaps, is_day_number, is_epoch, looks_like_time, seconds_of, without_leaps
@@ -179,6 +179,8 @@ def understand(raw: RawTable, kind: str, given: Entry) -> Understood:
     raw = with_units_of_cells(raw)
     names = [column_name(column.name) for column in raw.columns]
     chosen = choose(raw, names, kind, given, about)
+    if "input" not in chosen:
+        refuse_gaps_without_input(raw)
     columns: dict[str, Numbers] = {}
     taken: list[Taken] = []
     decimal = given.words.get("decimal") or str(raw.settings.get("decimal", "."))

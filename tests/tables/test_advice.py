@@ -40,6 +40,20 @@ def test_the_axis_that_moves_is_the_input_and_two_moving_axes_are_asked_about(tm
     assert {"columns.input=Z [mm]", "columns.input=Y [mm]"} == set(keys[:2])
 
 
+def test_gaps_measured_without_the_input_are_to_be_measured_with_it(tmp_path: Path) -> None:
+    header = "frame,time_s,status,gap_mm,u_gap_mm,u_random_mm,gap_px,u_gap_px,left_x_px,right_x_px"
+    rows = [
+        f"{k},{0.04 * k:.2f},ok,{4 + 0.1 * k:.1f},0.01,0.001,{136 + 3 * k},0.05,{250 - k},{390 + k}" for k in range(30)
+    ]
+    table = tmp_path / "gaps.csv"
+    table.write_text("\n".join([header, *rows]), encoding="utf-8")
+    with pytest.raises(DataError, match="--drive"):
+        read_measured_table(table)
+    # A column of the user's own beside them can be the input.
+    table.write_text("\n".join([f"{header},stage position [mm]", *(f"{row},{row.split(',')[1]}" for row in rows)]))
+    assert read_measured_table(table).input_mm.max() == pytest.approx(29 * 0.04)
+
+
 @pytest.mark.parametrize("size", [1e-3, 1e3])
 def test_metres_or_micrometres_called_millimetres_are_asked_about_even_if_both_columns_are(
     size: float, tmp_path: Path
