@@ -13,6 +13,7 @@ from calib.known_widths import KnownSize, find_widths
 from calib.measured_scale import Calibration as MeasuredScale
 from fingervision.interface.argument_checks import path_of, region_of, speaks_python
 from fingervision.measuring.picture_response import PictureResponse
+from fingervision.measuring.scale import field_of_view
 from fingervision.storage.calibration_json import read_calibration, refuse_foreign, write_calibration, write_picture
 
 if TYPE_CHECKING:
@@ -33,10 +34,12 @@ TABLE_GAP_MM, TABLE_U_PX = 1.0, 0.0106
 
 
 def scale_lines(calibration: MeasuredScale) -> list[str]:
-    """Lines with scale and edge bias and their expanded uncertainties."""
+    """Lines with the scale, what the picture shows at it, and the edge bias, with their expanded uncertainties."""
     scale, u = calibration.px_per_mm, calibration.u_px_per_mm
+    width, height = calibration.frame_size_px
     return [
-        f"scale      {scale:.5f} px/mm   U = {2 * u:.5f} px/mm (k = 2), {200 * u / scale:.4f} %",
+        f"scale      {scale:.7g} px/mm   U = {2 * u:.2g} px/mm (k = 2), {200 * u / scale:.2g} %",
+        f"picture    {width} x {height} px show {field_of_view((width, height), scale)}",
         f"edge bias  {calibration.edge_bias_px:+.4f} px       U = {2 * calibration.u_edge_bias_px:.4f} px (k = 2)",
     ]
 
@@ -334,7 +337,7 @@ class Calibration:
     def __repr__(self) -> str:
         width, height = self.frame_size_px
         return (
-            f"Calibration({self.px_per_mm:.4f} px/mm, U = {2.0 * self.u_px_per_mm:.4f} px/mm (k = 2), edge bias "
+            f"Calibration({self.px_per_mm:.6g} px/mm, U = {2.0 * self.u_px_per_mm:.2g} px/mm (k = 2), edge bias "
             f"{self.edge_bias_px:+.4f} px, for {width}x{height} pixels)"
         )
 

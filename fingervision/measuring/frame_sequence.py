@@ -332,7 +332,9 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     sides_px = np.array([_followed(below, *side, end.slope) for side in sides])
     sides_px -= across_px if np.isnan(sides_px[0, 0]) else sides_px[0, 0]
     ends = sorted((inner_px, inner_px - BAND_PX * inwards if np.isnan(outer_px) else outer_px))
-    ends_px = max(0, int(ends[0])), max(0, int(ends[1])) + 1
+    # The slope at a measuring point on the top of a tip leads out of the picture within a band.
+    first_px, last_px = np.clip(ends, 0, rows.shape[1] - 1).astype(int).tolist()
+    ends_px = first_px, last_px + 1
     bands = min(BEYOND, tip // BAND_PX)
     if not bands:
         return _Look(sides_px, np.empty(0), level, ends_px)

@@ -55,6 +55,21 @@ def stated_scale(px_per_mm: float, u_px_per_mm: float | None = None) -> BareScal
     return StatedScale(px_per_mm, u_px_per_mm)
 
 
+def field_of_view(frame_size_px: tuple[int, int], px_per_mm: float) -> str:
+    """Width and height that a picture shows at a scale, in the unit that a person would use.
+
+    A scale that is wrong by a factor of 1000 is easily overlooked as a number, and not as a picture of a house.
+
+    Examples
+    --------
+    >>> field_of_view((640, 480), 34.0), field_of_view((640, 480), 0.034)
+    ('18.8 x 14.1 mm', '18.8 x 14.1 m')
+    """
+    width_mm, height_mm = (size_px / px_per_mm for size_px in frame_size_px)
+    in_unit, unit = (1e-3, "m") if width_mm >= 1e3 else (1.0, "mm") if width_mm >= 1.0 else (1e3, "µm")
+    return f"{in_unit * width_mm:.3g} x {in_unit * height_mm:.3g} {unit}"
+
+
 def check_one_scale(calibration: object, px_per_mm: object, u_px_per_mm: object) -> None:
     """Refuse two scales at once, and an uncertainty that is stated without its scale.
 

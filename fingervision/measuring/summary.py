@@ -18,7 +18,7 @@ from fingervision.domain.errors import InputFileError
 from fingervision.domain.status import Status
 from fingervision.frames.source import Description
 from fingervision.measuring.light_change import light_change
-from fingervision.measuring.scale import Scale
+from fingervision.measuring.scale import Scale, field_of_view
 from fingervision.measuring.series import GapSeries
 
 # Coverage factor k of the expanded uncertainty U = k u (JCGM 100:2008, 6.2), for a coverage of about 95 %.
@@ -129,6 +129,7 @@ def summarise(
         "camera": _camera(series),
         "uncertainty": {**_uncertainty(scale, settings), "parts": series.budget},
         "advice": [
+            *_about_scale(description, settings, scale),
             *_about_unseen(description, series),
             *([LOSSLESS_ADVICE.format(codec=description.codec)] if description.lossy else []),
             *_about_fingers(series),
@@ -184,6 +185,20 @@ def _camera(series: GapSeries) -> dict[str, Any]:
 
 def _states_no_limits(scale: Scale) -> bool:
     return isinstance(scale, Calibration) and scale.states_no_limits
+
+
+def _about_scale(description: Description, settings: Mapping[str, Any], scale: Scale) -> list[str]:
+    """Warning if the measuring height is less than a pixel, as where the scale is stated in another unit."""
+    below_px = settings["below_tip_mm"] * scale.px_per_mm
+    if below_px >= 1.0:
+        return []
+    shown = field_of_view((description.width_px, description.height_px), scale.px_per_mm)
+    return [
+        f"The gap is measured {settings['below_tip_mm']:g} mm below the tips, which is {below_px:.2g} px at "
+        f"{scale.px_per_mm:.4g} px/mm, where the edges bend into the tips: at this scale, the picture of "
+        f"{description.width_px}x{description.height_px} pixels shows {shown}. State the right scale, or measure "
+        "farther below the tips (--below-tip-mm)."
+    ]
 
 
 def _about_unseen(description: Description, series: GapSeries) -> list[str]:

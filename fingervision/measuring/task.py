@@ -14,7 +14,7 @@ from fingervision.domain.frame import Region
 from fingervision.frames.source import Description
 from fingervision.gauges.gauge_file import Gauge, check_gauges
 from fingervision.measuring.gap_budget import choose_response
-from fingervision.measuring.scale import Scale, scale_for_frames
+from fingervision.measuring.scale import Scale, field_of_view, scale_for_frames
 from fingervision.vision.flanks import STEEPEST
 from fingervision.vision.pipeline import Settings
 
@@ -164,8 +164,9 @@ def task_for_frames(task: Task, description: Description) -> Task:
     if below_px >= max(width_px, height_px):
         raise UsageError(
             f"--below-tip-mm must lie within the picture of {width_px}x{height_px} pixels, but "
-            f"{task.below_tip_mm:g} mm are {below_px:.0f} px at {task.scale.px_per_mm:g} px/mm: state a smaller "
-            "height, or the right scale."
+            f"{task.below_tip_mm:g} mm are {below_px:.0f} px at {task.scale.px_per_mm:g} px/mm, at which the picture "
+            f"shows {field_of_view((width_px, height_px), task.scale.px_per_mm)}: state a smaller height, or the right "
+            "scale."
         )
     if task.drive is not None and not description.has_times:
         raise UsageError(

@@ -77,7 +77,7 @@ def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:
     of = f"{frames} frame{'' if frames == 1 else 's'}"
     if not gap["count"]:
         counts = ", ".join(f"{count} {status.value}" for status, count in series.counts.most_common())
-        return f"no gap in {of}: {counts}" if counts else "no frame"
+        return f"no gap in {of}: {counts}; report() says why" if counts else "no frame"
     least, greatest = gap["least_mm"], gap["greatest_mm"]
     values = f"gap {least:.4f} mm" if gap["count"] == 1 else f"gap {least:.4f} to {greatest:.4f} mm"
     u_mm, only = gap["median_u_gap_mm"], ""

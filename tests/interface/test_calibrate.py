@@ -133,6 +133,21 @@ def test_names_what_cannot_be_meant(arguments: tuple, options: dict, argument: s
     assert "--" not in str(refused.value)
 
 
+@pytest.mark.parametrize("size", ["5", True, 0.0, [5000]])
+def test_a_size_that_is_none_is_named_with_its_picture(size: object) -> None:
+    with pytest.raises(ArgumentError, match="size") as refused:
+        fv.calibrate("bar", {FOLDER / "bar_05mm.png": size})
+    assert "bar_05mm.png" in str(refused.value)
+
+
+def test_sizes_in_another_unit_show_in_what_the_picture_would_show() -> None:
+    sizes = {"bar_05mm.png": 5.0, "bar_11mm.png": 11.0}
+    for factor, shown in ((1.0, "18.8 x 14.1 mm"), (1e3, "18.8 x 14.1 m\n"), (1e-3, "18.8 x 14.1 µm")):
+        found = fv.calibrate("bar", {FOLDER / name: factor * size for name, size in sizes.items()})
+        assert shown in found.report()
+        assert " 0.00000 px/mm" not in found.report()
+
+
 def test_what_shows_no_reference_is_said() -> None:
     with pytest.raises(fv.FingervisionError):
         fv.calibrate("bar", [(np.full((480, 640), 128, np.uint8), 5.0)])

@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import fingervision as fv
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.status import Status
@@ -232,3 +234,10 @@ def test_an_older_picture_beside_damaged_ones_is_refused(shown: dict[int, int], 
 )
 def test_true_pictures_beside_damaged_ones_are_kept(gaps_px: list[float], lost: set[int]) -> None:
     assert kept_beside_damage(gaps_px, {}, lost) == {*range(20)} - lost
+
+
+def test_a_measuring_height_on_the_top_of_a_tip_leaves_the_outlines_in_the_picture() -> None:
+    """A scale stated in another unit measures a hundredth of a pixel below round tips, where slopes are any."""
+    sample = Path(__file__).parents[2] / "sample_frames" / "opening" / "opening.mp4"
+    found = fv.measure(sample, px_per_mm=0.034, frames=(236, 250))
+    assert sum(found.counts.values()) == 15

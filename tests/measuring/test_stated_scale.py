@@ -112,3 +112,11 @@ def test_as_a_file_it_is_the_same_scale(tmp_path: Path) -> None:
     u_mm = [each.distances(points, np.array([0.02]), np.array([True])).u_mm for each in (scale, again)]
     assert u_mm[0] == pytest.approx(u_mm[1])
     assert again.response_shift_px == 0.0
+
+
+def test_a_scale_that_is_wrong_by_a_thousand_is_said_by_what_the_picture_would_show(clip: Path) -> None:
+    found = fv.measure(clip, px_per_mm=PX_PER_MM / 1e3)
+    assert "12 x 10 m" in found.report()
+    assert "12 x 10 m" not in fv.measure(clip, px_per_mm=PX_PER_MM).report()
+    with pytest.raises(UsageError, match="12 x 10 µm"):
+        fv.measure(clip, px_per_mm=PX_PER_MM * 1e3)
