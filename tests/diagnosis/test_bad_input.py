@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import fingervision as fv
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.errors import DataError
 from fingervision.domain.report import DiagnosisReport, Verdict
@@ -13,6 +14,7 @@ from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 
 PLAY_MM, NOISE_MM, GAP_MM = 0.04, 0.002, 3.0
+SAMPLE = Path(__file__).parents[2] / "sample_frames" / "opening"
 TARGETS = np.linspace(0.0, 2.0, 9)
 Columns = dict[str, np.ndarray]
 EVERY_S = 20.0
@@ -145,6 +147,17 @@ def test_a_model_in_another_unit_is_said_and_nothing_is_named(tmp_path: Path, sc
     said = re.search(r"moves (\S+) times as far as the model predicts: check the units", report.unknown or "")
     assert said is not None
     assert float(said.group(1)) == pytest.approx(1.0 / scale, rel=0.01)
+
+
+def test_an_end_stop_that_holds_a_model_in_micrometres_still_explains_nothing() -> None:
+    measured = fv.measure(
+        SAMPLE / "opening.mp4", calibration=SAMPLE / "calibration.json", drive=SAMPLE / "drive.csv"
+    ).measured_table()
+    simulation = fv.read_table(SAMPLE / "simulation.csv", "simulation")
+    gap_um = 1e3 * (simulation.right_mm - simulation.left_mm)
+    found = fv.diagnose(measured, {"input_mm": simulation.input_mm, "gap_mm": gap_um})
+    assert found.verdict is Verdict.UNKNOWN
+    assert "0.001 times as far as the model predicts" in found.report.sentence
 
 
 @pytest.mark.parametrize(("gain", "asks"), [(0.5, True), (1.25, False)])

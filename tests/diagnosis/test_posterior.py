@@ -9,7 +9,7 @@ import pytest
 import fingervision as fv
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.posterior import settled
+from fingervision.diagnosis.inference.posterior import beside_alternatives, settled
 from fingervision.diagnosis.inference.record_errors import simulated_errors, with_record_errors
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.domain.drive import DriveHistory
@@ -75,6 +75,13 @@ def test_a_play_of_nothing_is_not_known_exactly(problem: Problem) -> None:
     # Half of the play changes the gap by 7 mm per mm, and the mean over some 200 samples in motion shows 0.001 mm.
     assert 0.0 <= play_mm < 1e-3
     assert 5e-5 < u < 1e-3
+
+
+def test_an_alternative_of_far_better_odds_without_the_parameter_leaves_its_covariance(problem: Problem) -> None:
+    best = fit(problem, ("rest_gap_error",), {"rest_gap_error": {"offset_mm": 0.001}}, iterations=20)
+    far = replace(best, values={"rest_gap_error": {"offset_mm": 3.0}})
+    other = fit(problem, ("lever_ratio_error",), {"lever_ratio_error": {"ratio": 0.001}}, iterations=20)
+    assert np.array_equal(beside_alternatives(problem, far, (other,)).covariance, far.covariance)
 
 
 def test_the_record_of_an_encoder_widens_a_play_and_an_exact_one_does_not(tmp_path: Path) -> None:

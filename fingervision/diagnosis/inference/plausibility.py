@@ -75,7 +75,8 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
         Estimation problem with its noise.
     rivals : sequence of Explanation
         Explanations by effects, and the model without effects. If there is none but the latter, only gains are asked
-        about that no effect has; a delay, for example, can mirror a motion.
+        about that no effect has; a delay, for example, can mirror a motion. Effects that leave as much of the gap as a
+        mistake may not leave either explain no gap: an end stop that holds a model in micrometres nearly still.
     """
     units = [each for unit in UNITS for each in (unit, 1.0 / unit)]
     gains = [(gain, 0) for gain in (0.0, -1.0, *units, *(-each for each in units))]
@@ -90,7 +91,8 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
     if not tried:
         return None
     cost, gain = min(tried)
-    if cost > _physical(problem, rivals) - STRONG:
+    explaining = [each for each in rivals if not each.names or _explains(data, problem, each)]
+    if cost > _physical(problem, explaining) - STRONG:
         return None
     if gain == 0.0:
         words = (
@@ -162,6 +164,14 @@ def _leaves_less(data: Observations, problem: Problem, gain: float) -> bool:
     gap, moved = data.table.gap_mm[kept], _moved(data)[:n][kept]
     left, disagreement, all_of_it = (float(np.var(each)) for each in (gap - gain * moved, gap - moved, gap))
     return left < HALF * (min(disagreement, all_of_it) if gain else disagreement)
+
+
+def _explains(data: Observations, problem: Problem, found: Explanation) -> bool:
+    """Whether effects leave less than half of the variance of the measured gap."""
+    n = data.chain.history.input_mm.size
+    kept = ~problem.whitener.aside[:n]
+    left = (data.stacked_mm - data.chain.stacked(found.values))[:n][kept]
+    return float(np.var(left)) < HALF * float(np.var(data.stacked_mm[:n][kept]))
 
 
 def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Finding | None:

@@ -258,8 +258,10 @@ def beside_alternatives(problem: Problem, best: Explanation, alternatives: Seque
         return best
     # The noise, and the path, may have been estimated anew since the alternatives were fitted.
     against = np.array([odds(problem, problem.judged(e, e.values)) for e in (best, *others)])
-    weights = np.exp(-0.5 * (against - against.min()))
     has = np.array([[name in e.names for name, _ in own] for e in (best, *others)])
+    # Of each parameter, among the explanations that have it, whose odds may all be small against another one's.
+    against = np.where(has, against[:, None], np.inf)
+    weights = np.exp(-0.5 * (against - against.min(axis=0)))
     away = [[e.values[n][p] - best.values[n][p] if n in e.names else 0.0 for n, p in own] for e in others]
-    apart = np.array(away) * np.sqrt(weights[1:, None] / (weights @ has))
+    apart = np.array(away) * np.sqrt(weights[1:] / weights.sum(axis=0))
     return replace(best, covariance=best.covariance + apart.T @ apart)
