@@ -22,10 +22,15 @@ version.
     └── PluginError                  a plug-in cannot be used; its classes are in `fingervision.plugins.faults`
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from enum import IntEnum
+from textwrap import shorten
 from typing import Any
+
+MOST_LETTERS = 300
+"""Length to which the message of another library is shortened within a sentence."""
 
 
 class ExitCode(IntEnum):
@@ -195,3 +200,17 @@ class MissingLibraryError(InstallationError, ImportError):
         self.library, self.extra = library, extra
         advice = f"pip install 'fingervision[{extra}]'" + (f", or {instead}" if instead else "")
         super().__init__(f"{what} needs {library}, which is not installed: {advice}.")
+
+
+def error_words(error: BaseException) -> str:
+    r"""Message of an error within a sentence, without its full stop; that of a library in one line, after its class.
+
+    Examples
+    --------
+    >>> error_words(OSError("No device\n\t* check its cable\n"))
+    'OSError: No device; check its cable'
+    """
+    if isinstance(error, FingervisionError):
+        return str(error).rstrip(".")
+    listed = re.sub(r"\s*\n\s*[*-]\s+", "; ", f"{type(error).__name__}: {error}")
+    return shorten(listed, MOST_LETTERS, placeholder=" ...").rstrip(" .:")

@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 
 from fingervision.domain.effect import Array, DriveEffect, Effect, History, PointEffect, Stage, Values
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, error_words
 from fingervision.domain.parameter import Parameter
 from fingervision.domain.response import Response
 from fingervision.plugins.faults import MisfitError
@@ -199,8 +199,10 @@ def _same(name: str, what: str, answer: object, shape: tuple[int, ...], values: 
 
 
 def _raised(error: Exception, values: Values) -> str:
-    words = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-    return f"must return a result for all parameter values within their bounds, but raised {words} at {_told(values)}"
+    return (
+        "must return a result for all parameter values within their bounds, but raised "
+        f"{error_words(error)} at {_told(values)}"
+    )
 
 
 def _told(values: Values) -> str:

@@ -79,7 +79,7 @@ def stated_shape(pictures: object, argument: str = "source") -> NDArray[np.gener
     raise ArgumentError(argument, MUST, f"has shape {shape}")
 
 
-def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "source") -> Pixels:
+def levels_of(picture: NDArray[np.generic], index: int | None = None, argument: str = "source") -> Pixels:
     """Return the levels of one picture in 8 or 16 bits.
 
     An alpha channel is dropped where it is opaque. Floats must lie between 0 (black) and 1 (full scale); they are
@@ -89,8 +89,8 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
     ----------
     picture : ndarray, shape (height, width) or (height, width, colours)
         One picture of a stack accepted by `stated_shape`.
-    words : str
-        Description of the picture for error messages, with a leading blank.
+    index : int or None
+        Number of the picture among several, for error messages.
     argument : str
         Name of the argument, for error messages.
 
@@ -104,7 +104,7 @@ def levels_of(picture: NDArray[np.generic], words: str = "", argument: str = "so
     ArgumentError
         If a level is not a number, lies outside 0 to 1, or has an alpha value that is not opaque.
     """
-    subject = f"{argument}{words and ' '}{words.strip()}" if words else argument
+    subject = argument if index is None else f"picture {index} of {argument}"
     if picture.dtype.kind == "f":
         bad = int(np.count_nonzero(~np.isfinite(picture)))
         if bad:
@@ -152,7 +152,7 @@ def _stored(picture: NDArray[np.generic]) -> NDArray[np.generic]:
 
 
 def what_it_is(value: object) -> str:
-    """Type of a value in words, with its size if the value has one: 'a list of 3'."""
+    """Type of a value in words, with its size if the value has one: 'a list of length 3'."""
     kind = type(value)
     library = kind.__module__.partition(".")[0]
     name = kind.__name__ if library in ("builtins", "__main__") else f"{library} {kind.__name__}"
@@ -163,5 +163,5 @@ def what_it_is(value: object) -> str:
     if isinstance(shape, tuple):
         return f"{article} {name} of shape {shape}"
     if isinstance(value, list | tuple | dict | set):
-        return f"{article} {name} of {len(value)}"
+        return f"{article} {name} of length {len(value)}"
     return f"{article} {name}"

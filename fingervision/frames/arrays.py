@@ -83,8 +83,7 @@ class ArrayFrames:
         """Yield the pictures one by one; each is checked and converted when it is yielded."""
         is_single = self.pictures.ndim < 4 and len(self._stack) == 1
         for index, picture in enumerate(self._stack):
-            words = "" if is_single else f" of picture {index}"
-            yield Frame(levels_of(picture, words), index, self._time_s(index), self.coding)
+            yield Frame(levels_of(picture, None if is_single else index), index, self._time_s(index), self.coding)
 
     @property
     def has_float_levels(self) -> bool:
@@ -181,7 +180,7 @@ class PictureStream:
                 found = f"picture {index} is {single.dtype} of shape {single.shape}"
                 raise ArgumentError("source", must, found)
             # Copied, because frames are read ahead and a generator may use its array again for the next picture.
-            levels = levels_of(single.copy(), f" of picture {index}")
+            levels = levels_of(single.copy(), index)
             yield Frame(levels, index, self._time_s(index), self.coding)
         if self._times_s is not None and len(self._times_s) != index + 1:
             found = f"{len(self._times_s)} are given"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fingervision.domain.errors import ArgumentError, FingervisionError, UsageError
+from fingervision.domain.errors import ArgumentError, FingervisionError, UsageError, error_words
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames.array_levels import what_it_is
@@ -193,8 +193,7 @@ class CheckedFrames:
         except Exception as error:
             if not self.is_plugin:
                 raise
-            said = f"it raised {type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-            raise self.refused("yield its frames", said) from error
+            raise self.refused("yield its frames", f"it raised {error_words(error)}") from error
         finally:
             close = getattr(self.source, "close", None)
             if close is not None and not self._is_live:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import isclose, isfinite
 from typing import Protocol, cast
 
-from fingervision.domain.errors import DeviceError, FingervisionError, UsageError
+from fingervision.domain.errors import DeviceError, FingervisionError, UsageError, error_words
 
 EXPOSURE, GAIN, FOCUS, ZOOM, FRAME_RATE = "exposure", "gain", "focus", "zoom", "frame rate"
 MOVES_SCALE = frozenset({FOCUS, ZOOM})
@@ -141,8 +141,7 @@ def adjust(source: object, name: str, value: float) -> tuple[CameraControl, Came
     except FingervisionError:
         raise
     except Exception as error:  # an error in a driver must not end the live view
-        said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". ")
-        raise DeviceError(f"The camera refused to set {name} {before.words(value)} ({said}).") from error
+        raise DeviceError(f"The camera refused to set {name} {before.words(value)} ({error_words(error)}).") from error
     after = next((each for each in controls_of(source) if each.name == name), None)
     if after is None:
         raise DeviceError(f"The camera was set to {name} {before.words(value)}, but no longer reports its {name}.")

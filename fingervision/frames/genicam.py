@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import DeviceError, InputFileError
+from fingervision.domain.errors import DeviceError, InputFileError, error_words
 from fingervision.domain.frame import Coding, Frame, LostFrame, Pixels
 from fingervision.domain.needed_library import needed_library
 from fingervision.domain.status import Status
@@ -123,11 +123,6 @@ def _choices(nodes: Any, node: str) -> tuple[str, ...]:
         return tuple(getattr(nodes, node).symbolics)
     except Exception:
         return ()
-
-
-def error_words(error: Exception) -> str:
-    """Return class and message of an error in one line, without the final full stop."""
-    return f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(". :")
 
 
 START = "genicam:"

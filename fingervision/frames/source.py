@@ -14,7 +14,7 @@ from typing import Protocol, cast
 import av
 
 import fingervision.frames
-from fingervision.domain.errors import FingervisionError, InputFileError, UsageError
+from fingervision.domain.errors import FingervisionError, InputFileError, UsageError, error_words
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.plugins.faults import MisfitError, PluginShapeError
 from fingervision.plugins.origin import Entry
@@ -235,8 +235,7 @@ def _opened(entry: Entry[SourceKind], name: str, wish: Wish) -> FrameSource:
     except FingervisionError:
         raise
     except Exception as error:
-        said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-        raise PluginShapeError(f"{who} could not open {name} ({said}): {entry.origin.remedy}.") from error
+        raise PluginShapeError(f"{who} could not open {name} ({error_words(error)}): {entry.origin.remedy}.") from error
     if not described:
         raise PluginShapeError(
             f"{who} must return a frame source (an iterable object with a Description), but returned a "

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -80,11 +81,20 @@ def references_of(pictures: Any, kind: str) -> list[Reference]:
             prefix, colon, rest = source.partition(":")
             if colon and prefix in KINDS:
                 which, source = prefix, rest
-        size = number(ARGUMENT, item[1])
+        if isinstance(item[1], bool) or not isinstance(item[1], Real):
+            states = f"states {item[1]!r} for {_named(source)}"
+            raise ArgumentTypeError(ARGUMENT, "state each size as a number in mm", states)
+        size = float(item[1])
         if not 0.0 < size < float("inf"):
-            raise ArgumentError(ARGUMENT, "have positive sizes", f"has {size:g}")
+            states = f"states {size:g} for {_named(source)}"
+            raise ArgumentError(ARGUMENT, "state each size as a positive number in mm", states)
         found.append(Reference(which, source, size))
     return found
+
+
+def _named(source: Any) -> str:
+    """Name of a picture in an error: its file, or what it is."""
+    return str(source) if isinstance(source, str | os.PathLike) else what_it_is(source)
 
 
 def known_sizes(references: Sequence[Reference], u_size_mm: float) -> list[KnownSize]:
@@ -143,7 +153,7 @@ def _read(source: Any, index: int) -> tuple[str, GreyImage]:
         stack = stated_shape(source, ARGUMENT)
         if len(stack) != 1:
             raise ArgumentError(ARGUMENT, "be single pictures", f"holds a stack of {len(stack)}")
-        return f"picture {index}", to_grey(levels_of(stack[0], f" [{index}]", ARGUMENT))
+        return f"picture {index}", to_grey(levels_of(stack[0], index, ARGUMENT))
     if not isinstance(source, str | os.PathLike):
         raise ArgumentTypeError(ARGUMENT, "hold names of files or numpy arrays", f"holds {what_it_is(source)}")
     path = Path(source)

@@ -8,7 +8,7 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.domain.errors import FingervisionError, UsageError
+from fingervision.domain.errors import FingervisionError, UsageError, error_words
 from fingervision.domain.gripper import Gripper
 from fingervision.domain.model import Model
 from fingervision.models.answer_figures import LINEAR, ModelFigures, Physics
@@ -160,8 +160,9 @@ def _tried(
     except FingervisionError:
         raise
     except Exception as error:
-        said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
-        raise PluginShapeError(f"{who} must work for every drawing, but raised {said}: {origin.remedy}.") from error
+        raise PluginShapeError(
+            f"{who} must work for every drawing, but raised {error_words(error)}: {origin.remedy}."
+        ) from error
     if shapes != {asked.shape} or not np.all(np.isfinite(gap_mm)):
         words = f"{gap_mm.tolist()}" if shapes == {asked.shape} else f"shape {sorted(shapes)}"
         raise PluginShapeError(

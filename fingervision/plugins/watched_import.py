@@ -7,7 +7,7 @@ from collections.abc import Callable
 from math import isfinite
 from typing import TypeVar
 
-from fingervision.domain.errors import UsageError
+from fingervision.domain.errors import UsageError, error_words
 from fingervision.plugins.faults import (
     MisfitError,
     PluginError,
@@ -148,5 +148,4 @@ def watched(who: str, origin: Origin, act: Callable[[], T]) -> T:
     except (KeyboardInterrupt, MemoryError):
         raise
     except BaseException as error:
-        said = f"{type(error).__name__}{f': {error}' if str(error) else ''}".replace("\n", " ")[:300].rstrip(".")
-        raise PluginImportError(f"{who} could not be imported ({said}): {origin.remedy}.") from error
+        raise PluginImportError(f"{who} could not be imported ({error_words(error)}): {origin.remedy}.") from error

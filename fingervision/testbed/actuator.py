@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import error_words
 from fingervision.domain.field import Field
 from fingervision.testbed.force_sensor import Reading
 
@@ -142,6 +142,5 @@ class Actuator(MoveCheck, Protocol):
 
 
 def in_a_line(error: Exception) -> str:
-    """An exception's message, and the class of one from elsewhere, in one line without a full stop."""
-    said = str(error) if isinstance(error, FingervisionError | RefusedError) else f"{type(error).__name__}: {error}"
-    return said.replace("\n", " ")[:200].rstrip(".")
+    """Message of an exception within a sentence, as by `error_words`; of a refusal, the device's own words."""
+    return error.words.rstrip(".") if isinstance(error, RefusedError) else error_words(error)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Generic, Protocol, cast
 
-from fingervision.domain.errors import FingervisionError
+from fingervision.domain.errors import FingervisionError, error_words
 from fingervision.plugins.faults import MisfitError, PluginShapeError
 from fingervision.plugins.origin import Entry, Origin, of_file
 from fingervision.plugins.registry import Registry
@@ -109,8 +109,7 @@ def _faults(who: str, what: str, origin: Origin) -> Iterator[None]:
     except FingervisionError:
         raise
     except Exception as error:
-        said = f"{type(error).__name__}{f': {error}' if str(error) else ''}".replace("\n", " ")[:200].rstrip(".")
-        raise PluginShapeError(f"{who} must {what}, but raised {said}: {origin.remedy}.") from error
+        raise PluginShapeError(f"{who} must {what}, but raised {error_words(error)}: {origin.remedy}.") from error
 
 
 PACKAGES = {"actuator": actuators, "force_sensor": force_sensors, "camera": cameras}

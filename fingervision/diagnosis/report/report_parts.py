@@ -4,6 +4,7 @@ import logging
 from typing import Protocol, cast
 
 from fingervision.diagnosis.diagnose import Diagnosis
+from fingervision.domain.errors import error_words
 from fingervision.plugins.faults import MisfitError
 from fingervision.plugins.registry import Registry
 
@@ -41,10 +42,9 @@ def added_sections(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         try:
             content = entry.value.html(diagnosis)
         except Exception as error:  # a failing section must not affect the rest of the report
-            said = f"{type(error).__name__}: {error}".replace("\n", " ")[:200].rstrip(".")
             LOG.warning(
                 "fingervision: The report part %s of %s is left out, as it raised %s: %s.",
-                entry.name, entry.origin, said, entry.origin.remedy,
+                entry.name, entry.origin, error_words(error), entry.origin.remedy,
             )  # fmt: skip
             continue
         if isinstance(content, str):
