@@ -125,6 +125,7 @@ class NextRun:
 class DiagnosisReport(ShortRepr):
     """The result of a diagnosis, with the fields of report.json.
 
+    `unknown` says what no effect of the catalogue explains; it is None if nothing of that kind was found.
     `explained_share` is 1 - (after / before)^2 and `standing_share` is after / before, where `before` and `after` are
     the counted RMS of the disagreement: without outliers and the scatter between runs. `pure_error_mm` is the standard
     deviation of replicates of the gap, None without replicates. `outlier_rows` describes each row set aside in the fit.

@@ -90,6 +90,9 @@ def columns_of(argument: str, table: Any, must: str) -> dict[str, list[Any]]:
     if not isinstance(table, Mapping) and not (hasattr(table, "columns") and hasattr(table, "__getitem__")):
         raise ArgumentTypeError(argument, f"be {must}", f"is {what_it_is(table)}")
     names = list(table) if isinstance(table, Mapping) else [str(name) for name in table.columns]
+    for name in names:
+        if not hasattr(table[name], "__iter__"):
+            raise ArgumentTypeError(argument, f"have a list or an array in column {name}", f"has {table[name]!r}")
     columns = {str(name): list(table[name]) for name in names}
     lengths = {len(column) for column in columns.values()}
     if len(lengths) > 1:
@@ -112,16 +115,24 @@ def _numbers(argument: str, name: str, cells: list[Any]) -> Numbers:
     value = np.zeros(len(cells))
     for row in np.flatnonzero(present).tolist():
         try:
-            value[row] = float(cells[row])
+            value[row] = _real(cells[row])
         except (TypeError, ValueError):
             raise ArgumentError(
-                argument, f"have numbers in column {name}", f"has {cells[row]!r} in row {row}"
+                argument, f"have real numbers in column {name}", f"has {cells[row]!r} in row {row}"
             ) from None
     if not np.all(np.isfinite(value)):
         raise ArgumentError(argument, f"have finite numbers in column {name}", "has an infinite one")
     return Numbers(value, present)
 
 
+def _real(cell: Any) -> float:
+    """Return a cell as a number; NumPy makes floats of truth values, and of complex numbers with a mere warning."""
+    if isinstance(cell, bool | np.bool | complex | np.complexfloating):
+        raise TypeError
+    return float(cell)
+
+
 def _is_missing(cell: Any) -> bool:
-    """Whether a cell is empty: None, pandas' NA, or NaN, which represents a missing value in a DataFrame."""
-    return cell is None or type(cell).__name__ in ("NAType", "NaTType") or (isinstance(cell, float) and cell != cell)
+    """Whether a cell is empty: None, masked, pandas' NA, or NaN, which represents a missing value in a DataFrame."""
+    empty = cell is None or cell is np.ma.masked or type(cell).__name__ in ("NAType", "NaTType")
+    return empty or (isinstance(cell, float) and cell != cell)

@@ -68,7 +68,10 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict, one of agrees, named, ambiguous, unknown."""
+        """The verdict: agrees, named, ambiguous (several explanations, `report.alternatives`) or unknown.
+
+        Where it is unknown, `report.sentence` says why, and `report.next_step` what to record or to look at next.
+        """
         return self.report.verdict
 
     @property

@@ -234,12 +234,20 @@ def points_of(answer: Answer, time_s: Array) -> dict[str, Array]:
         if name not in answer:
             continue
         try:
-            values = np.asarray(answer[name], dtype=np.float64)
+            stated = np.asarray(answer[name])
+            # NumPy makes floats of truth values, and of complex numbers with a mere warning.
+            is_real = answer[name] is not None and stated.dtype.kind not in "bc"
+            values = stated.astype(np.float64) if is_real else None
         except (TypeError, ValueError):
-            raise ValueError(f"must give numbers for {name}, but gives {type(answer[name]).__name__}.") from None
+            values = None
+        if values is None:
+            what = getattr(answer[name], "dtype", type(answer[name]).__name__)
+            raise ValueError(f"must give real numbers for {name}, but gives {what}.")
         if values.shape != time_s.shape:
+            gives = f"shape {values.shape}" if values.ndim else "a single number"
             raise ValueError(
-                f"must give {time_s.size} values of {name}, one for each time, but gives shape {values.shape}."
+                f"must give an array with one value of {name} for each of the {time_s.size} times and inputs with "
+                f"which it is called, but gives {gives}."
             )
         if not np.all(np.isfinite(values)):
             at_s = float(time_s[np.flatnonzero(~np.isfinite(values))[0]])

@@ -213,7 +213,7 @@ def test_a_function_is_a_model_like_its_table(tmp_path, of_table: fv.Diagnosis) 
 @pytest.mark.parametrize(
     ("function", "fact"),
     [
-        (lambda time_s, input_mm: 3.0, "shape ()"),
+        (lambda time_s, input_mm: 3.0, "a single number"),
         (lambda time_s, input_mm: {"x": input_mm}, "gap_mm"),
         (lambda time_s, input_mm: 1 / 0, "ZeroDivisionError"),
         (lambda time_s: time_s, "TypeError"),
@@ -225,6 +225,35 @@ def test_a_function_that_is_no_model_is_told_why(function, fact: str) -> None:
     with pytest.raises(fv.ModelError) as told:
         fv.simulate(function, {"time_s": [0.0, 1.0, 2.0], "input_mm": [0.0, 0.5, 1.0]})
     assert fact in str(told.value)
+
+
+MASKED = np.ma.masked_array(4.0 + np.arange(10.0), mask=np.arange(10) == 9)
+
+
+@pytest.mark.parametrize(
+    ("gap_mm", "fact"),
+    [
+        (MASKED.filled() + 1j, "real numbers in column gap_mm"),
+        (MASKED > 6.0, "real numbers in column gap_mm"),
+        (np.ma.masked_all(10), "but has 0"),
+        (4.0, "list or an array"),
+    ],
+    ids=["complex", "truth", "masked", "scalar"],
+)
+def test_a_column_that_holds_no_numbers_is_named(gap_mm: object, fact: str) -> None:
+    inputs = 0.1 * np.arange(10)
+    with pytest.raises((fv.ArgumentError, fv.DataError), match=fact):
+        fv.diagnose({"input_mm": inputs, "gap_mm": gap_mm}, TABLE)
+
+
+def test_a_masked_value_is_a_missing_one() -> None:
+    from fingervision.interface.column_tables import measured_from_columns
+
+    inputs = 0.1 * np.arange(10)
+    kept = {"input_mm": inputs[:9], "gap_mm": MASKED.data[:9]}
+    masked, left_out = (measured_from_columns(table) for table in ({"input_mm": inputs, "gap_mm": MASKED}, kept))
+    assert np.array_equal(masked.gap_mm, left_out.gap_mm)
+    assert np.array_equal(masked.input_mm, left_out.input_mm)
 
 
 def test_results_pickle_and_print_in_few_words(of_table: fv.Diagnosis) -> None:

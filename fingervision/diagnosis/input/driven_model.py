@@ -34,8 +34,8 @@ def at_rest_beside(table: MeasuredTable, model: CorrectedModel) -> tuple[Correct
         return model, None
     if table.time_s is None:
         raise DataError(
-            f"{model.base_path} computes the gap from the input over time, but the measured table has no column "
-            "time_s: add it, or give a table of static gaps as the model."
+            f"{model.base_path or model.name} computes the gap from the input over time, but the measured table has no "
+            "column time_s: add it, or give a table of static gaps as the model."
         )
     inputs, _, _ = recorded(table)
     static = model.base.at_rest(float(inputs.min()), float(inputs.max()))
