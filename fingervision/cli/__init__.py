@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 import click
 
 from fingervision import __version__
-from fingervision.cli._command import Group
+from fingervision.cli._command import COLOUR, Group, complain
 from fingervision.domain.errors import ExitCode, FingervisionError, UsageError
 
 TRACEBACK = "FINGERVISION_TRACEBACK"
@@ -72,11 +72,11 @@ class Commands(Group):
             with command_words():
                 return super().invoke(ctx)
         except KeyboardInterrupt:
-            click.echo("fingervision: Stopped before it was done, as asked (Ctrl-C or SIGTERM).", err=True)
+            complain("Stopped before it was done, as asked (Ctrl-C or SIGTERM).")
             ctx.exit(ExitCode.COULD_NOT)
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "color": COLOUR})
 @click.version_option(__version__, prog_name="fingervision")
 def cli() -> None:
     """Measure a compliant gripper's finger gap in video, and explain where simulation and measurement disagree."""
@@ -91,14 +91,12 @@ def main() -> None:
     try:
         Path.cwd()
     except FileNotFoundError:
-        click.echo(
-            "fingervision: The current folder does not exist any more: change to a folder that exists.", err=True
-        )
+        complain("The current folder does not exist any more: change to a folder that exists.")
         sys.exit(ExitCode.COULD_NOT)
     try:
         cli(standalone_mode=True)
     except FingervisionError as error:
-        click.echo(f"fingervision: {_printable(str(error))}", err=True)
+        complain(_printable(str(error)))
         sys.exit(error.exit_code)
     except Exception as error:
         # Errors of files are reported where the files are written; an error without a file name concerns standard
@@ -107,7 +105,7 @@ def main() -> None:
             _give_up_output(error)
         if TRACEBACK in os.environ:
             raise
-        click.echo(f"fingervision: {_printable(_of_system(error) or _unexpected(error))}", err=True)
+        complain(_printable(_of_system(error) or _unexpected(error)))
         sys.exit(ExitCode.COULD_NOT)
     finally:
         try:
@@ -182,8 +180,5 @@ def _give_up_output(error: OSError) -> NoReturn:
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if error.errno != errno.EPIPE:
-        click.echo(
-            f"fingervision: Standard output could not be written completely ({error.strerror}): free disk space.",
-            err=True,
-        )
+        complain(f"Standard output could not be written completely ({error.strerror}): free disk space.")
     sys.exit(ExitCode.COULD_NOT)

@@ -74,6 +74,11 @@ def listed_runs(
             hint = f"did you mean {near[0].replace('-', '_')}?" if near else "remove it, or name it like an option"
             raise DataError(f"The columns of {path} must be {INPUTS[command]} and options, but one is {name}: {hint}")
     column = INPUTS[command] if results is None else INPUTS["measure"]
+    if column not in names and INPUTS["measure"] in names:
+        raise DataError(
+            f"{path} lists recordings, but {command} needs their gaps: name the folder in which `batch measure` wrote "
+            f"them with --results, or list them in a column {column}."
+        )
     table = read_columns(path, (column,), texts=[name for name in names if name != column])
     inputs = [str(cell) for cell in _texts(table, column)]
     found = []

@@ -1,4 +1,4 @@
-"""Form of a command: help in named groups with nothing cut, former spellings of options, and types of values."""
+"""Form of a command: help in named groups with nothing cut, colours, former spellings of options, types of values."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -28,6 +28,24 @@ WHOLE = 10_000
 """More letters than the first sentence of any command has, so that the list of commands cuts none."""
 
 
+COLOUR = False if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb" else None
+"""Whether words may be bold or coloured (https://no-color.org); None asks whether the output is a terminal."""
+
+
+def complain(words: str) -> None:
+    """Print an error, after the name of the program."""
+    click.echo(f"{click.style('fingervision:', fg='red', bold=True)} {words}", err=True, color=COLOUR)
+
+
+class _Formatter(click.HelpFormatter):
+    def write_heading(self, heading: str) -> None:
+        super().write_heading(click.style(heading, bold=True))
+
+
+class _Context(click.Context):
+    formatter_class = _Formatter
+
+
 class Option(click.Option):
     """An option that stands in a group of the help, and keeps spellings that it had in an earlier version.
 
@@ -52,6 +70,8 @@ class Option(click.Option):
 
 class Command(click.Command):
     """A command whose help lists the options in their groups."""
+
+    context_class = _Context
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write one section for every group."""

@@ -12,7 +12,7 @@ import click
 
 from fingervision.batch.task import NO_ROOM, Ended
 from fingervision.cli import cli
-from fingervision.cli._command import FILE, FOLDER, OUTPUT, Command, Group, Option
+from fingervision.cli._command import FILE, FOLDER, OUTPUT, Command, Group, Option, complain
 from fingervision.domain.errors import ExitCode, FingervisionError, InputFileError, StateError, UsageError
 
 if TYPE_CHECKING:
@@ -362,15 +362,12 @@ def _report(plan: "Plan", batch: "Batch", as_json: bool) -> None:
         click.echo(f"Written: {batch.out / 'batch.csv'}, {batch.out / 'batch.png'}, {batch.out / 'index.html'}")
     for one in batch.bad[:BAD_SHOWN] if not batch.stopped else ():
         subject = "" if one.words.startswith(one.input) else f"{one.input}: "
-        click.echo(f"fingervision: {subject}{one.words}", err=True)
+        complain(f"{subject}{one.words}")
     if len(batch.bad) > BAD_SHOWN and not batch.stopped:
-        click.echo(
-            f"fingervision: {len(batch.bad) - BAD_SHOWN} more inputs without a result are listed in "
-            f"{batch.out / 'batch.csv'}.",
-            err=True,
-        )
+        left = len(batch.bad) - BAD_SHOWN
+        complain(f"{left} more inputs without a result are listed in {batch.out / 'batch.csv'}.")
     if batch.stopped:
-        click.echo(f"fingervision: {batch.stopped}", err=True)
+        complain(batch.stopped)
 
 
 for _name in COMMANDS:

@@ -39,6 +39,9 @@ With --reference, instead of these:
   changes.json   what changed, and where         changes.svg   the drawing, coloured by the evidence
 """
 
+COLOURS, DOUBTFUL = {"agrees": "green", "named": "cyan"}, "yellow"
+"""Colours of a verdict in a terminal."""
+
 
 @make_command(EXAMPLES)
 @click.argument("measured", type=FILE)
@@ -114,7 +117,11 @@ def command(
             call=running_command(),
         )
     document = done.write(out, title, names_of([model_path], names).get(model_path, ""))
-    click.echo(json.dumps(document, indent=2) if as_json else f"{done.sentences()}\n  {out / PAGE}")
+    if as_json:
+        click.echo(json.dumps(document, indent=2))
+        return
+    verdict, colon, rest = done.sentences().partition(":")
+    click.echo(f"{click.style(verdict, bold=True, fg=COLOURS.get(verdict, DOUBTFUL))}{colon}{rest}\n  {out / PAGE}")
 
 
 def _changes(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from fingervision.cli._command import FILE, MEASURED, OUTPUT, make_command, option
+from fingervision.cli._command import FILE, MEASURED, OUTPUT, complain, make_command, option
 from fingervision.cli._options import (
     columns_option,
     drive_options,
@@ -292,4 +292,4 @@ def _print_result(measured: "Measured") -> None:
 
 
 def _complain(sentence: str) -> None:
-    click.echo(f"fingervision: {sentence}", err=True)
+    complain(sentence)

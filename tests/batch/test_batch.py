@@ -389,5 +389,8 @@ def test_inputs_are_named_one_way(copy: Path, run: Run) -> None:
     for arguments in ((), (copy / "a" / "good.mkv", "--list", copy / "runs.csv")):
         code, _, said = run("batch", "measure", *arguments, *ALONE, "--out", "day")
         assert (code, "--list" in said) == (2, True)
+    code, _, said = run("batch", "diagnose", "--list", copy / "runs.csv", "--out", "why")
+    assert code == 1
+    assert "--results" in said
     code, _, said = run("batch", "diagnose", "--list", copy / "runs.csv", "--results", copy / "none", "--out", "why")
     assert code == 1
