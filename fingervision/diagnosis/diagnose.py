@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calib.short_repr import ShortRepr
 from fingervision.diagnosis.bodies.body_evidence import BodyEvidence
 from fingervision.diagnosis.bodies.place_diagnosis import diagnose_with_bodies, without_places
 from fingervision.diagnosis.inference.clock_shift import beside_clock
@@ -154,8 +155,8 @@ MOST_DRIVES = 2
 """Number of times that a dynamic model is recomputed with the effects found."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Diagnosis:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Diagnosis(ShortRepr):
     """The report of a diagnosis, with the arrays for its plots.
 
     Parameters

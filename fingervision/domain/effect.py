@@ -196,7 +196,7 @@ DriveAct = Callable[[Array, History, Values], Array]
 PointAct = Callable[[Response, History, Values], Response]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Effect:
     """One physical effect of the catalogue.
 
@@ -304,6 +304,9 @@ class Effect:
     in_drawing: DrawingForm | None = None
     demonstrated: bool = False
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name}: {self.words})"
+
     def search(self, history: History) -> tuple[Parameter, ...] | str:
         """Return the parameters with bounds narrowed to what the data can show, or the reason why they show nothing."""
         if self.needs_times and history.time_s is None:
@@ -337,7 +340,7 @@ def _start(words: str, run: int) -> Parameter:
     return Parameter(start_key(run), "", -1.0, 1.0, f"{words}, in run {run + 1}", run=run)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class DriveEffect(Effect):
     """An effect of the drive: `act(input_mm, history, values)` returns the input that the mechanism receives.
 
@@ -349,7 +352,7 @@ class DriveEffect(Effect):
     act_curved: DriveAct | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class PointEffect(Effect):
     """An effect of the mechanism or camera: `act(response, history, values)` returns the changed measuring points.
 

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.short_repr import ShortRepr
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
@@ -44,8 +45,8 @@ STEEPEST, LOST_BLUR_PX = 0.995, 2.0 * GOOD_BLUR_PX
 FILLED = 0.6
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sample:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Sample(ShortRepr):
     """Frames of a recording and their measurements, from which all findings are computed.
 
     Parameters

@@ -261,7 +261,8 @@ def test_results_pickle_and_print_in_few_words(of_table: fv.Diagnosis) -> None:
     found = of_table
     results = [
         measured, measured.budget, found, found.report, found.corrected_model, fv.compare(driven(), TABLE),
-        fv.simulate(line, {"time_s": [0.0, 1.0], "input_mm": [0.0, 1.0]}),
+        fv.simulate(line, {"time_s": [0.0, 1.0], "input_mm": [0.0, 1.0]}), found.found, fv.effects.backlash,
+        fv.inspect(list(pictures(3)), px_per_mm=34.0).sample,
     ]  # fmt: skip
     for each in results:
         again = pickle.loads(pickle.dumps(each))

@@ -57,7 +57,7 @@ def test_the_summary_says_from_which_frame_on(is_known: bool) -> None:
     ]
     series.add(results, maker.rows(results))
     recording = Description("drawn", "images", "raw", Coding.LOSSLESS, 640, 480, 25.0, True, FRAMES.size)
-    advice = summarise(recording, {}, BareScale(34.0), None, series, complete=True)["advice"]
+    advice = summarise(recording, {"below_tip_mm": 0.3}, BareScale(34.0), None, series, complete=True)["advice"]
     said = [words for words in advice if words.startswith("From frame 20 on")]
     assert len(said) == (0 if is_known else 1)
     assert all("0.60 times" in words and "--frames 20:59" in words for words in said)
