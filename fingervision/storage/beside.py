@@ -51,14 +51,13 @@ def clock_beside(table: Path) -> FoundClock:
         settings = measurement_beside(table)["settings"]
         if settings["drive_offset"] != "found":
             return ONE_CLOCK
+        u_s = float(settings["u_drive_time_s"])
         # Summaries of older versions state no play.
-        u_s, *play = (
-            float(settings[name]) for name in ("u_drive_time_s", "drive_play_mm", "u_drive_play_mm") if name in settings
-        )
+        play_mm, u_play_mm = (float(settings.get(name, 0.0)) for name in ("drive_play_mm", "u_drive_play_mm"))
     except (ValueError, LookupError, TypeError):
         return ONE_CLOCK
-    known = 0.0 < u_s < float("inf") and all(0.0 <= each < float("inf") for each in play)
-    return FoundClock(u_s, *play) if known else ONE_CLOCK
+    known = 0.0 < u_s < float("inf") and 0.0 <= play_mm < float("inf") and 0.0 <= u_play_mm < float("inf")
+    return FoundClock(u_s, play_mm, u_play_mm) if known else ONE_CLOCK
 
 
 def response_note(summary: Mapping[str, Any], shifts_px: Iterable[float]) -> tuple[str, ...]:

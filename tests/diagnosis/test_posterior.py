@@ -175,6 +175,18 @@ def test_a_play_seen_at_one_reversal_does_not_depend_on_the_offset_that_the_cloc
     assert abs(width.value - 0.03) < 2.0 * width.u < 0.001
 
 
+def test_a_run_of_one_row_beside_a_clock_is_no_obstacle():
+    time_s = np.arange(0.0, 8.0, 0.04)
+    stands_mm = np.interp(time_s, [0.0, 4.0, 8.0], [0.0, 1.2, 0.0])
+    gap_mm = 1.2 + 7.72 * play(stands_mm, 0.05, 0.3) + np.random.default_rng(4).normal(0.0, 1e-3, time_s.size)
+    columns = {"time_s": time_s.tolist(), "input_mm": stands_mm.tolist(), "gap_mm": gap_mm.tolist()}
+    table = measured_from_columns(columns | {"run": ["there and back"] * (time_s.size - 1) + ["again"]})
+    table = replace(table, clock=FoundClock(1e-3, 0.05, 1e-3))
+    found = fv.diagnose(table, {"input_mm": [-0.5, 1.6], "gap_mm": [-2.66, 13.552]}).report
+    assert [effect.name for effect in found.effects] == ["backlash"]
+    assert abs(found.effects[0].parameters["play_mm"].value - 0.05) < 2e-3
+
+
 @pytest.mark.parametrize("seed", [7301002, 7301027], ids=["wander", "steps"])
 def test_the_errors_of_a_log_between_its_rows_belong_to_the_uncertainty_of_a_play(seed):
     # Encoders of 4 and 11 um, rows at 40 and 19 Hz: the input at each frame does not show what they leave open.

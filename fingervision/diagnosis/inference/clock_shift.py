@@ -72,7 +72,7 @@ def _nearer(data: Observations, found: Findings) -> Observations | None:
     if float(missed @ missed) <= BENT:
         return None
     words = (
-        f"the offset between the clocks was fitted together with the effects: the stage moved {share * prior_s:+.2g} s "
-        "later than the table states."
+        f"the offset between the clocks was fitted together with the effects: the stage moved "
+        f"{abs(share) * prior_s:.2g} s {'later' if share > 0.0 else 'earlier'} than the table states."
     )
     return replace(data.later(share * prior_s), notes=(*data.notes, words))

@@ -10,6 +10,7 @@ from fingervision.diagnosis.inference.hypothesis import START_VARIANCE, Explanat
 from fingervision.diagnosis.inference.hypothesis_fit import derivatives, refit
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.input.observations import Observations
+from fingervision.diagnosis.input.record_nuisances import moved
 from fingervision.diagnosis.noise.channel_noises import (
     CORRELATIONS,
     LINE,
@@ -235,9 +236,10 @@ def with_clock_errors(data: Observations, problem: Problem, explanation: Explana
     )
     lost_mm = wide_mm - narrow_mm
     rows = problem.chain.history
-    speed = np.concatenate([np.gradient(rows.input_mm[run], rows.times[run]) for run in rows.runs])
+    step_s = 0.5 * rows.sample_time_s
+    later_mm = moved(rows, rows.input_mm, step_s) - moved(rows, rows.input_mm, -step_s)
     # Zero, scale and time of the input are free beside a clock that was found from the motion.
-    free = np.stack([lost_mm, np.ones_like(speed), rows.input_mm, speed], axis=1)
+    free = np.stack([lost_mm, np.ones_like(lost_mm), rows.input_mm, later_mm], axis=1)
     apart_mm = problem.chain.driven_mm(explanation.values) - narrow_mm
     apart = float(np.linalg.lstsq(free, apart_mm, rcond=None)[0][0])
     size = np.hypot(1.0, apart / np.sqrt(3.0))

@@ -54,11 +54,11 @@ def clock_columns(chain: MeasuringChain, u_clock_s: float, values: Mapping[str, 
     # Step of the difference: the offset's uncertainty, but at most half a sample, over which the record is straight.
     step_s = min(u_clock_s, 0.5 * history.sample_time_s)
     predicted = chain.stacked(values).reshape(-1, history.input_mm.size)
-    change = [_moved(history, one, step_s) - _moved(history, one, -step_s) for one in predicted]
+    change = [moved(history, one, step_s) - moved(history, one, -step_s) for one in predicted]
     return np.asarray(np.concatenate(change) * (FREEDOM * u_clock_s / (2.0 * step_s)))[:, None]
 
 
-def _moved(history: History, values: Array, by_s: float) -> Array:
+def moved(history: History, values: Array, by_s: float) -> Array:
     """Values of each run at times later by `by_s`; shape (n,)."""
     out = np.empty_like(values)
     for run in history.runs:
