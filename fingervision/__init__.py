@@ -57,6 +57,7 @@ _HOMES = {
     "EffectAnswerError": "effects.trial",
     "OpenQuestionError": "tables.questions",
     "OutputError": "domain.errors",
+    "MisfitError": "plugins.faults",
     "PluginError": "plugins.faults",
     "PluginImportError": "plugins.faults",
     "PluginNameError": "plugins.faults",

@@ -49,6 +49,7 @@ from fingervision.interface.simulation import Simulation as Simulation
 from fingervision.interface.simulation import simulate as simulate
 from fingervision.interface.tables import read_model as read_model
 from fingervision.interface.tables import read_table as read_table
+from fingervision.plugins.faults import MisfitError as MisfitError
 from fingervision.plugins.faults import PluginError as PluginError
 from fingervision.plugins.faults import PluginImportError as PluginImportError
 from fingervision.plugins.faults import PluginNameError as PluginNameError

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 
 def test_help_imports_neither_opencv_nor_scipy() -> None:
     program = (
@@ -17,7 +19,21 @@ def test_help_imports_neither_opencv_nor_scipy() -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_an_unknown_command_is_wrong_usage() -> None:
-    done = subprocess.run([sys.executable, "-m", "fingervision", "mesure"], capture_output=True, text=True, check=False)
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["mesure"], ["No such command 'mesure'", "'measure'"]),
+        (["opening.mp4"], ["opening.mp4", "measure", "table"]),
+        (["calibrate", "bor"], ["No such command 'bor'", "'bar'"]),
+        (
+            ["calibrate", "opening.mp4"],
+            ["opening.mp4", "bar", "slot", "scale", "chessboard", "charuco", "response", "check"],
+        ),
+        (["batch", "opening.mp4"], ["opening.mp4", "measure", "diagnose"]),
+    ],
+    ids=" ".join,
+)
+def test_an_unknown_command_is_wrong_usage_and_is_told_which_there_are(given: list[str], said: list[str]) -> None:
+    done = subprocess.run([sys.executable, "-m", "fingervision", *given], capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "No such command 'mesure'" in done.stderr
+    assert not [word for word in said if word not in done.stderr]

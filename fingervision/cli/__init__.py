@@ -8,7 +8,6 @@ import signal
 import sys
 import unicodedata
 from contextlib import suppress
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -54,15 +53,6 @@ class Commands(Group):
         command = importlib.import_module(f"{__name__}.{cmd_name}").command
         assert isinstance(command, click.Command)  # noqa: S101 - a module without a command is a defect of this package
         return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Suggest the nearest command for a name that does not exist."""
-        known = self.list_commands(ctx)
-        if args[0] not in known and not args[0].startswith("-") and (near := get_close_matches(args[0], known, n=1)):
-            ctx.fail(f"No such command '{args[0]}'. Did you mean '{near[0]}'?")
-        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; an error about an argument states the name of the command-line option."""

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -85,9 +86,34 @@ class Command(click.Command):
 
 
 class Group(click.Group, Command):
-    """A command with subcommands, of which the help tells the whole first sentence."""
+    """A command with subcommands, of which the help tells the whole first sentence.
+
+    Parameters
+    ----------
+    kinds : str
+        The subcommands, each with what it is for; by default only their names.
+    """
 
     command_class = Command
+
+    def __init__(self, *given: Any, kinds: str = "", **settings: Any) -> None:
+        super().__init__(*given, **settings)
+        self._kinds = kinds
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Say for a name that does not exist which is the nearest, or which there are and what each is for."""
+        known = self.list_commands(ctx)
+        if args[0] not in known and not args[0].startswith("-"):
+            if near := get_close_matches(args[0], known, n=1):
+                ctx.fail(f"No such command '{args[0]}'. Did you mean '{near[0]}'?")
+            kinds = self._kinds or f"{', '.join(known[:-1])} or {known[-1]}"
+            raise UsageError(
+                f"{ctx.command_path} must be followed by {kinds}, but is followed by {args[0]}: see {ctx.command_path} "
+                "--help."
+            )
+        return super().resolve_command(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the subcommands, in the order of their definition."""
@@ -176,8 +202,6 @@ class KindName(click.ParamType):  # type: ignore[type-arg]  # generic in new ver
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Refuse an unknown kind, naming the nearest known one."""
-        from difflib import get_close_matches
-
         names = self._names()
         if value not in names:
             near = get_close_matches(str(value), names, n=1)

@@ -73,7 +73,13 @@ Examples:
 """
 
 
-@click.group("calibrate", cls=Group, epilog=GROUP_EXAMPLES)
+KINDS = (
+    "bar or slot (objects or openings of known width), scale (a line scale), chessboard or charuco (a board; lens and "
+    "tilt too), response (the camera's curve), check (of a calibration) or repeat (of recordings)"
+)
+
+
+@click.group("calibrate", cls=Group, epilog=GROUP_EXAMPLES, kinds=KINDS)
 def command() -> None:
     """Calibrate pixels to millimetres from a reference of known size."""
 

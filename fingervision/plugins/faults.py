@@ -27,5 +27,5 @@ class PluginVersionError(PluginError):
     """A plug-in needs another version of fingervision than the installed version."""
 
 
-class MisfitError(ValueError):
-    """A plug-in does not meet its requirements; the message `must ..., but ...` is printed after the plug-in's name."""
+class MisfitError(PluginShapeError):
+    """The cause of a PluginShapeError; its message `must ..., but ...` does not name the plug-in yet."""

@@ -136,10 +136,10 @@ def watched(who: str, origin: Origin, act: Callable[[], T]) -> T:
             f"{who} must be imported and tried within {seconds:g} s, but was still running at this time limit and was "
             f"stopped: look for an endless loop at its top or in its functions; {origin.remedy}."
         ) from None
-    except PluginError:
-        raise
     except MisfitError as error:
         raise PluginShapeError(f"{who} {error}; {origin.remedy}.") from error
+    except PluginError:
+        raise
     except ModuleNotFoundError as error:
         raise PluginImportError(
             f"{who} could not be imported, as the module {error.name} is missing: install that module, or "

@@ -26,7 +26,8 @@ MOST_BEHIND = 12
 SAME_MOTION = 0.1
 """Largest difference of two columns of one motion, as a share of the range."""
 NEVER = -100
-"""Points of a column without numbers, and of times for any other role, which are not suggested."""
+"""Points of a column without numbers, of one with a unit of another dimension, and of times for any role but the time;
+such columns are not suggested."""
 READINGS = frozenset(
     [
         "actual",
@@ -133,8 +134,9 @@ def _points(column: RawColumn, name: ColumnName, role: str, decimal: str) -> int
     if role in DIMENSION and role != "time" and is_time:
         return NEVER
     is_sized = unit != "" and factor(unit, DIMENSION.get(role, "length")) is not None
-    if is_sized or known_unit(unit) is not None:
-        points += BY_UNIT if is_sized else -2 * BY_UNIT
+    if not is_sized and known_unit(unit) is not None:
+        return NEVER
+    points += BY_UNIT * is_sized
     points += BY_READING * (role == "input" and bool(READINGS & set(tokens(name.base))))
     points -= BY_READING * (role == "input" and "target" in found) + BY_READING * is_constant
     is_clock = increases(column, decimal)

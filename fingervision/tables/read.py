@@ -163,8 +163,8 @@ def _table_or_no_model(path: Path, columns: Path | None) -> TableModel:
         if path.is_dir() or path.suffix.lower() in TABLE_ENDINGS:
             raise
         raise DataError(
-            f"{path} is not a model: it must be a simulation table, a gripper.toml, mechanism.toml or model.toml, an "
-            f"FMU, or a Python file with simulate(time_s, input_mm). The file cannot be read as a table either: {error}"
+            f"{path} is not a model: name a simulation table, a gripper.toml, mechanism.toml or model.toml, an FMU, or "
+            "a Python file with simulate(time_s, input_mm)."
         ) from error
 
 

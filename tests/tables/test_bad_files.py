@@ -214,6 +214,15 @@ def test_prose_given_as_a_model_is_said_to_be_none(tmp_path: Path) -> None:
         read_model(prose)
     assert "simulation table" in str(caught.value)
     assert "FMU" in str(caught.value)
+    assert ". " not in str(caught.value).removeprefix(str(tmp_path))
+
+
+def test_a_table_of_lengths_is_no_drive_and_none_of_its_columns_is_suggested_as_the_time(tmp_path: Path) -> None:
+    path = tmp_path / "simulation.csv"
+    path.write_text("input_mm,gap_mm\n-0.5,0.1394\n1.6,16.353920\n", encoding="utf-8")
+    with pytest.raises(DataError, match="must have a column time_s") as caught:
+        read_drive(path)
+    assert "columns.time" not in str(caught.value)
 
 
 def test_a_text_with_a_table_in_it_is_no_table(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ US_PER_S = 1_000_000
 NUMBERS = 128
 
 
-class BoardRefusalError(FingervisionError):
+class BoardRefusalError(DeviceError):
     """The board did not execute a command; `reason` is the cause, as stated by the board."""
 
     def __init__(self, port: str | None, reason: str) -> None:
