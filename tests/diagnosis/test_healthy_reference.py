@@ -160,6 +160,15 @@ def test_the_drawing_is_coloured_by_the_evidence(answers: PlaceAnswers) -> None:
     nothing = replace(told, found=replace(found, changed=False, members=()))
     assert nothing.verdict == "unchanged"
     assert nothing.document()["places"] == []
+    assert "do not differ" in nothing.sentences()[0]
+
+
+def test_what_a_gauge_would_change_is_not_called_no_difference() -> None:
+    rng = np.random.default_rng(5)
+    moved = gap_changes(gap_recording(rng), gap_recording(rng, 0.02))
+    answer = Compared(None, moved, None, False, (), ())
+    assert answer.verdict == "unchanged"
+    assert "gauge of the input" in answer.sentences()[0]
 
 
 @pytest.fixture

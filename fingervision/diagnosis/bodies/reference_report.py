@@ -188,6 +188,8 @@ class Compared:
 
     def _answer(self) -> str:
         if self.verdict == "unchanged":
+            if any(one.is_significant for one in self.gap):
+                return "unchanged: the recordings differ only as a gauge of the input that was set up anew would do it."
             return "unchanged: the two recordings do not differ by more than their uncertainty."
         if self.verdict == "place_not_told" or self.found is None or self.answers is None:
             return "changed, place not told: the two recordings differ, but not in a way that one place explains."
