@@ -207,10 +207,9 @@ class Effect:
     stage : Stage
         Section of the measuring chain in which the effect acts: drive, mechanism or camera.
     order : float
-        Position in the section of the chain: effects act in ascending order. The built-in effects have multiples of ten
-        (`fingervision effects NAME` prints the number), so that a user-defined effect may be put between two of them:
-        an effect that acts after the play (60) and before the jumps (70) has, for example, 65. By default, the effect
-        acts last in its section.
+        Position in the section of the chain: effects act in ascending order. `fingervision effects NAME` prints that
+        of a built-in effect, and a user-defined one may be put between any two: an effect that acts after the play (60)
+        and before the jumps (70) has, for example, 65. By default, the effect acts last in its section.
     words : str
         Short description of the effect.
     formula : str
