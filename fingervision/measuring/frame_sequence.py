@@ -12,7 +12,8 @@ change.
 Method: the outlines of a finger are followed from the measuring point towards its root, on the inner and on the outer
 side, as the places where the grey level is half-way between finger and ground. Relative to that next to the measuring
 point, and apart from a rotation, they must agree between two frames. Symmetric blur from motion or defocus, and a
-change of the light, leave these places where they are.
+change of the light, leave these places where they are. Where the fingers touch, or nearly do, no ground is seen between
+them: their inner sides there are compared in no frame, and the measuring points themselves take their place.
 """
 
 from collections.abc import Iterable, Iterator
@@ -75,8 +76,10 @@ class _Look:
 
     Parameters
     ----------
+    across_px : float
+        Measuring point across the fingers.
     sides_px : ndarray, shape (2, bands)
-        Inner and outer side relative to the measuring point, in bands from there towards the root; NaN where unseen.
+        Inner and outer side across the fingers, in bands from the measuring point towards the root; NaN where unseen.
     beyond : ndarray, shape (bands beyond the tip,)
         Share of the pixels straight beyond the tip that look like the finger, in bands from the tip outwards.
     level : float
@@ -85,6 +88,7 @@ class _Look:
         First pixel across the finger, and that behind its last; equal if the finger is not followed.
     """
 
+    across_px: float
     sides_px: Floats
     beyond: Floats
     level: float
@@ -205,10 +209,11 @@ def _is_alike(first: _Seen, second: _Seen) -> bool:
     if first.gap.direction is not second.gap.direction or first.frame.pixels.shape != second.frame.pixels.shape:
         return False
     moved_px = [abs(one - other) for (one, _), (other, _) in zip(first.positions, second.positions, strict=True)]
+    is_closed = _is_closed_in_bands(first, second)
     for k, (one, other) in enumerate(zip(first.fingers, second.fingers, strict=True)):
         bent_px = min(MOST_BENT_PX, BENT_SHARE * max(moved_px[k], moved_px[k + 2]))
         tolerance_px = JUMP_U * hypot(one.u_across_px, other.u_across_px) + CODED_PX + bent_px
-        if not _agree(first.looks[k], second.looks[k], tolerance_px):
+        if not _agree(first.looks[k], second.looks[k], is_closed, tolerance_px):
             return False
     along_px = [second.positions[k][0] - first.positions[k][0] for k in (2, 3)]
     u_along_px = hypot(*(seen.positions[k][1] for seen in (first, second) for k in (2, 3)))
@@ -219,6 +224,19 @@ def _is_alike(first: _Seen, second: _Seen) -> bool:
         or _shows_two_places(first, second)
         or _shows_two_places(second, first)
     )
+
+
+def _is_closed_in_bands(*pair: _Seen) -> NDArray[np.bool_]:
+    """Bands in which the gap of a frame is a few blurs at most, as seen there or as the other frame leads to expect."""
+    count = min(look.sides_px.shape[1] for seen in pair for look in seen.looks)
+    apart_px = np.array(
+        [right.sides_px[0, :count] - left.sides_px[0, :count] for left, right in (s.looks for s in pair)]
+    )
+    gap_px = np.array([[seen.gap.gap_px] for seen in pair])
+    # What stands on the other side of the other finger is no inner side.
+    apart_px = np.where(apart_px > 0.0, apart_px, (apart_px - gap_px)[::-1] + gap_px)
+    blur_px = max(PIXEL_PX, *(end.blur_px for seen in pair for end in seen.fingers))
+    return np.asarray((apart_px < LEVEL_IN_BLURS * blur_px).any(axis=0))
 
 
 def _shows_two_places(now: _Seen, other: _Seen) -> bool:
@@ -264,15 +282,20 @@ def _is_like(pixels: NDArray[Any], gap: GapMeasurement, level: float) -> NDArray
     return np.asarray(grey < level if gap.light_gap else grey > level)
 
 
-def _agree(one: _Look, other: _Look, tolerance_px: float) -> bool:
+def _agree(one: _Look, other: _Look, is_closed: NDArray[np.bool_], tolerance_px: float) -> bool:
     """Whether two outlines of a finger differ by no more than a rotation and a tolerance, beneath the same ground."""
     if one.is_comparable is not other.is_comparable:
         return False
-    count = min(one.sides_px.shape[1], other.sides_px.shape[1])
+    count = is_closed.size
     sides_px = np.stack((one.sides_px[:, :count], other.sides_px[:, :count]))
+    sides_px[:, 0, is_closed] = np.nan
     is_seen = np.isfinite(sides_px).any(axis=0)
     if np.count_nonzero(is_seen) < FEWEST_BANDS:
         return True
+    # Relative to the outline itself: an edge that is moved in one frame alone, such as by glare beside it that is not
+    # told in the next frame, is no other outline.
+    start_px = sides_px[:, 0, 0]
+    sides_px -= (start_px if np.isfinite(start_px).all() else np.array([one.across_px, other.across_px]))[:, None, None]
     change = sides_px[1] - sides_px[0]
     heights_px = BAND_PX * np.arange(count)
     lower, upper = _pairs(count)
@@ -311,8 +334,12 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     first, tip = floor(along_px), max(0, round(tip_px) - BAND_PX)
     count = max(0, min(BELOW, (upright.shape[0] - 1 - first) // BAND_PX))
     if first < 0 or count == 0:
-        return _Look(np.empty((2, 0)), np.empty(0), np.nan, (0, 0))
-    rows = to_grey(np.ascontiguousarray(upright[first : first + count * BAND_PX + 1])).astype(np.float32)
+        return _Look(across_px, np.empty((2, 0)), np.empty(0), np.nan, (0, 0))
+    # The levels are taken about the measuring height, where the gap is known: beside rounded tips it is another one
+    # within half a band.
+    reach = max(0, min(BAND_PX // 2, first, floor(along_px - tip_px)))
+    rows = to_grey(np.ascontiguousarray(upright[first - reach : first + count * BAND_PX + 1])).astype(np.float32)
+    middle, rows = rows[: 2 * reach + 1].mean(axis=0), rows[reach:]
     # The bands begin at the measuring height itself and not at a whole row: where the outline is curved, at a rounded
     # tip, a band half a row higher shows it at another place.
     rows = rows[:-1] + np.float32(along_px - first) * np.diff(rows, axis=0)
@@ -321,39 +348,35 @@ def _look(seen: _Seen, end: FingerEdge, is_left: bool) -> _Look:
     # The edge is measured at the measuring height, and the first band is centred half a band towards the root.
     inner_px = across_px + end.slope * 0.5 * (BAND_PX - 1)
     inwards = 1 if is_left else -1
-    # Half-way between finger and ground, and relative to the outline itself: an edge that is moved in one frame alone,
-    # such as by glare beside it that is not told in the next frame, is no other outline.
-    level, inner_level = _levels(below[0], inner_px, end.blur_px, inwards, seen.gap.gap_px)
+    level = _half_level(middle, across_px, end.blur_px, inwards, seen.gap.gap_px)
     rises = (inwards > 0) is seen.gap.light_gap
     _, opposite = _crossings(below[:1], level, not rises)
     outside = opposite[inwards * (inner_px - opposite) > 0.0]
     outer_px = float(outside.max() if is_left else outside.min()) if outside.size else float("nan")
-    sides = ((inner_level, rises, inner_px), (level, not rises, outer_px))
-    sides_px = np.array([_followed(below, *side, end.slope) for side in sides])
-    sides_px -= across_px if np.isnan(sides_px[0, 0]) else sides_px[0, 0]
+    sides = ((rises, inner_px), (not rises, outer_px))
+    sides_px = np.array([_followed(below, level, *side, end.slope) for side in sides])
     ends = sorted((inner_px, inner_px - BAND_PX * inwards if np.isnan(outer_px) else outer_px))
     # The slope at a measuring point on the top of a tip leads out of the picture within a band.
     first_px, last_px = np.clip(ends, 0, rows.shape[1] - 1).astype(int).tolist()
     ends_px = first_px, last_px + 1
     bands = min(BEYOND, tip // BAND_PX)
     if not bands:
-        return _Look(sides_px, np.empty(0), level, ends_px)
+        return _Look(across_px, sides_px, np.empty(0), level, ends_px)
     over = _is_like(upright[tip - bands * BAND_PX : tip, slice(*ends_px)], seen.gap, level)
-    return _Look(sides_px, over.reshape(bands, -1).mean(axis=1)[::-1], level, ends_px)
+    return _Look(across_px, sides_px, over.reshape(bands, -1).mean(axis=1)[::-1], level, ends_px)
 
 
-def _levels(profile: Floats, inner_px: float, blur_px: float, inwards: int, gap_px: float) -> tuple[float, float]:
-    """Levels at an edge with ground beside it, and at the inner edge, which the other finger's blur darkens.
+def _half_level(profile: Floats, edge_px: float, blur_px: float, inwards: int, gap_px: float) -> float:
+    """Level half-way between finger and ground at an inner edge.
 
     Across a gap of a few blurs the level of the ground is nowhere reached; it follows from that in the gap's middle.
     """
     blur_px = max(blur_px, PIXEL_PX)
     apart_px = min(LEVEL_IN_BLURS * blur_px, 0.5 * gap_px)
-    places = inner_px + inwards * np.array([-LEVEL_IN_BLURS * blur_px, apart_px])
+    places = edge_px + inwards * np.array([-LEVEL_IN_BLURS * blur_px, apart_px])
     finger, between = np.interp(places, np.arange(profile.size), profile)
     reached = ndtr(apart_px / blur_px) - ndtr((apart_px - gap_px) / blur_px)
-    step = float(between - finger) / float(reached)
-    return float(finger) + 0.5 * step, float(finger) + step * (0.5 - float(ndtr(-gap_px / blur_px)))
+    return float(finger + 0.5 * (between - finger) / reached)
 
 
 def _followed(bands: Floats, level: float, rises: bool, start_px: float, slope: float) -> Floats:

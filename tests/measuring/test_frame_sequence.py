@@ -95,6 +95,30 @@ def test_fingers_that_close_and_open_are_measured_until_they_touch(
     assert {*statuses} == {Status.OK, Status.TOUCHING}
 
 
+def round_fingers(gaps_px: list[float], change: Change) -> list[Judged]:
+    """Results of fingers whose straight sides touch first: at the measuring height their round tips are apart."""
+    results: list[Judged] = []
+    for k, gap_px in enumerate(gaps_px):
+        scene = two_fingers(gap_px, below_tip_px=6.0, width_px=60.0, radius_px=14.0, frame=SIZE_PX)
+        levels = render(scene, Camera(blur_px=0.9, noise_grey=1.0), np.random.default_rng(k))
+        change(k, levels)
+        frame = Frame(levels, k, k / 25)
+        results.append((frame, measure_frame(frame, SETTINGS)))
+    return list(in_sequence(results))
+
+
+def test_round_fingers_are_measured_while_their_straight_sides_touch_and_part() -> None:
+    opening = [2.3, 3.9, 5.9, 8.0, 10.3, 12.7, 15.4]
+    judged = round_fingers([*opening[::-1], *[0.0] * 5, *opening], lambda k, levels: None)
+    assert {outcome.status for _, outcome in judged} <= {Status.OK, Status.TOUCHING}
+    assert all(isinstance(outcome, GapMeasurement) for _, outcome in judged[-len(opening) + 1 :])
+
+
+def test_round_fingers_that_nearly_touch_are_refused_where_they_break() -> None:
+    judged = round_fingers([5.0] * 12, lambda k, levels: torn(levels, 5) if k == 6 else None)
+    assert [item.index for item, outcome in judged if isinstance(outcome, LostFrame)] == [6]
+
+
 @pytest.mark.parametrize("covered", [slice(160, None), slice(125, 195)], ids=["other finger gone", "gap filled"])
 def test_what_has_not_the_width_of_both_fingers_does_not_touch(covered: slice) -> None:
     results = []
