@@ -51,7 +51,10 @@ def test_sentence_shares_and_figures_count_the_same_rows(found: Diagnosis) -> No
     assert d.counted_before_rms_mm == pytest.approx(by_hand, rel=1e-9)
     assert d.before_rms_mm > 5.0 * by_hand
     assert d.counted_mm[1] / d.counted_mm[0] == pytest.approx(found.report.standing_share, rel=1e-9)
-    assert f"from {d.counted_mm[0]:.3g} to {d.counted_mm[1]:.3g} mm RMS of each finger's edge" in found.report.sentence
+    assert (
+        f"from {1e3 * d.counted_mm[0]:.3g} to {1e3 * d.counted_mm[1]:.3g} µm RMS of each finger's edge"
+        in found.report.sentence
+    )
     assert "with 3 of 500 rows left out" in found.report.sentence
 
 

@@ -226,6 +226,23 @@ def dragged(page: Any, chart: str, shares: tuple[float, float], *, shift: bool =
         page.keyboard.up("Shift")
 
 
+def test_a_model_without_a_known_input_says_what_is_missing_in_place_of_an_empty_panel(
+    frames: Path, tmp_path: Path, opened: Callable[..., Any]
+) -> None:
+    view = Playback(recorded(str(frames), RATE_HZ, Choices(scale=BareScale(PX_PER_MM)), ()), tmp_path / "out")
+    model = tmp_path / "model.csv"
+    model.write_text("input_mm,gap_mm\n0,1\n3,4\n")
+    view.features["model"] = Comparison(view, model)
+    with serving(view) as served:
+        view.start()
+        page = opened(served.address, viewport={"width": 1280, "height": 720})
+        shown(page, WHOLE)
+        page.locator("#model_words", has_text="log of the drive").wait_for()
+        for part in ("#residual_chart", "#worst"):
+            assert not page.locator(part).is_visible()
+        view.stop()
+
+
 def saved(page: Any, button: str) -> bytes:
     return downloaded(page, lambda: page.click(button)).read_bytes()
 

@@ -20,6 +20,7 @@ from fingervision.diagnosis.bodies.place_search import ALIKE
 from fingervision.diagnosis.bodies.place_words import body_places, set_words
 from fingervision.diagnosis.design.next_look import CHECK
 from fingervision.diagnosis.inference.verdict import STANDING_SHARE
+from fingervision.diagnosis.report.sentences import with_unit
 from fingervision.domain.effect import Array, DriveEffect, split_key
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
@@ -317,7 +318,7 @@ def _place_alone(done: "Diagnosis") -> "Diagnosis":
             unseen_after_rms_mm=d.unseen_before_rms_mm,
             counted_after_rms_mm=d.counted_before_rms_mm,
         ),
-        remaining=f"The remaining difference is {d.before_rms_mm:.3g} mm RMS: noise, or inexactness "
+        remaining=f"The remaining difference is {with_unit(d.before_rms_mm)} RMS: noise, or inexactness "
         "of the explanation's formula.",
     )
     return replace(done, report=report, after_mm=done.before_mm)

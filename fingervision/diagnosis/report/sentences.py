@@ -17,6 +17,8 @@ COVERAGE_FACTOR = 2.0
 VISIBLE = 0.1
 """Relative difference of the disagreement as the verdict counts it from that over all rows above which a sentence
 states both values; a smaller difference does not matter to a reader."""
+MOST_IN_UM_MM = 1.0
+"""Residual from which it is stated in millimetres; below, in micrometres, as the page and `measure` state an U."""
 EDGES = " of each finger's edge"
 QUESTION = "Please check the table first"
 """Beginning of the sentence about a mistake in the table that explains more than any effect."""
@@ -36,6 +38,18 @@ def phrase(effect: NamedEffect) -> str:
         parts.append(f"{effect.display_name(key)} {size}")
     coverage = "; k = 2" if any(e.u is not None for e in effect.parameters.values()) else ""
     return f"{effect.name} ({'; '.join(parts)}{coverage})"
+
+
+def in_one_unit(*sizes_mm: float) -> tuple[str, list[str]]:
+    """Unit in which the largest of some residuals or noises is easily read, and each of them in it, to three digits."""
+    unit, in_mm = ("mm", 1.0) if max(sizes_mm) >= MOST_IN_UM_MM else ("µm", 1e-3)
+    return unit, [f"{float(f'{size_mm / in_mm:.3g}'):.12g}" for size_mm in sizes_mm]
+
+
+def with_unit(size_mm: float) -> str:
+    """A residual or a noise with its unit."""
+    unit, (size,) = in_one_unit(size_mm)
+    return f"{size} {unit}"
 
 
 def limit_words(e: Estimate) -> str:
@@ -61,16 +75,17 @@ def answer(
     """
     (before_mm, after_mm), without = _said(d)
     of = EDGES if d.of == "edges" else ""
-    fall = f"the disagreement falls from {before_mm:.3g} to {after_mm:.3g} mm RMS{of}"
-    fall += f" at a random noise of {d.noise_rms_mm:.2g} mm"
+    unit, (before, after, all_before, all_after) = in_one_unit(before_mm, after_mm, d.before_rms_mm, d.after_rms_mm)
+    noise = with_unit(d.noise_rms_mm)
+    fall = f"the disagreement falls from {before} to {after} {unit} RMS{of} at a random noise of {noise}"
     if without:
-        fall += f", {without} (all rows: {d.before_rms_mm:.3g} to {d.after_rms_mm:.3g} mm)"
-    all_rows = f", {without}; all rows: {d.before_rms_mm:.3g} mm" if without else ""
+        fall += f", {without} (all rows: {all_before} to {all_after} {unit})"
+    all_rows = f", {without}; all rows: {all_before} {unit}" if without else ""
     what = phrase(effects[0]) if len(effects) == 1 else " and ".join(effect.name for effect in effects)
     if verdict is Verdict.AGREES:
         return (
-            f"Simulation and measurement agree within the random noise of {d.noise_rms_mm:.2g} mm "
-            f"(RMS disagreement {before_mm:.3g} mm{of}{all_rows})."
+            f"Simulation and measurement agree within the random noise of {noise} "
+            f"(RMS disagreement {before} {unit}{of}{all_rows})."
         )
     if verdict is Verdict.NAMED:
         return f"The model lacks {what}; {fall}."
@@ -114,18 +129,18 @@ def remaining(stands: Standing, left_over: str | None, harmonic: str, scatter_mm
     """Sentence about the residual that remains beside the named effects and the harmonics of a cyclic error."""
     if stands.is_noise:
         what = "random noise only" if stands.noise_is_known else "random noise or an error of the model"
-        words = f"The remaining difference is {stands.after_mm:.3g} mm RMS: {what}"
+        words = f"The remaining difference is {with_unit(stands.after_mm)} RMS: {what}"
     else:
         words = (
-            f"The remaining difference is {stands.after_mm:.3g} mm RMS, {100.0 * stands.share:.0f} % of the "
-            f"disagreement; {stands.noise_mm:.2g} mm of it would be random noise"
+            f"The remaining difference is {with_unit(stands.after_mm)} RMS, {100.0 * stands.share:.0f} % of the "
+            f"disagreement; {with_unit(stands.noise_mm)} of it would be random noise"
         )
     if left_over is not None:
         words += f"; the largest part of it is {left_over}, small compared with the explained part"
     if harmonic:
         words += f"; it does not contain {harmonic}, which was fitted too"
     if max(scatter_mm, default=0.0) > 0.0:
-        words += f"; the runs have offsets of {scatter_mm[0]:.2g} mm RMS in the gap"
+        words += f"; the runs have offsets of {with_unit(scatter_mm[0])} RMS in the gap"
     return words + "."
 
 

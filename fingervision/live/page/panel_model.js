@@ -35,7 +35,8 @@ listen("state", ({ model, bed, whole }) => {
   const last = model.recent < model.samples ? `last ${model.recent}: ` : "";
   say("model_residual", model.rms_um === null ? "no residual yet" : `${last}mean residual ${um(model.mean_um)}, RMS ${um(model.rms_um)}`);
   // Of a live view the newest row's; of a recording it would be the last row's, whichever frame is shown.
-  const input = model.input_mm === null ? "The input is not known yet. " : whole ? "" : `Input ${model.input_mm.toFixed(4)} mm. `;
+  const unknown = whole ? "A residual needs measured frames, and the log of the drive with the recording. " : "The input is not known yet: no residual is shown. ";
+  const input = model.input_mm === null ? unknown : whole ? "" : `Input ${model.input_mm.toFixed(4)} mm. `;
   say("model_words", `${input}${model.samples} samples against ${model.path}${model.band_um === null ? "" : `; U of one sample ${um(model.band_um)} (k = 2)`}.`);
   const { verdict } = model;
   const waits = model.busy ? "diagnose is at work…" : `A verdict needs 100 samples in motion, there and back: so far ${model.moved}.`;

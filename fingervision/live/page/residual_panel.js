@@ -33,7 +33,8 @@ function zeroLine(chart) {
   chart.ctx.restore();
 }
 listen("state", ({ model, second }) => {
-  const compared = Boolean(model || second);
+  // An empty panel tells nothing: beside a model it comes with the first residual, and stays.
+  const compared = Boolean(second || (model && (model.rms_um !== null || !at("residual_chart").hidden)));
   if (at("residual_chart").hidden === !compared) return;
   at("residual_chart").hidden = at("worst").hidden = !compared;
   document.body.classList.toggle("modelled", compared);
