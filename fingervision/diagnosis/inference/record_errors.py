@@ -238,10 +238,14 @@ def with_clock_errors(data: Observations, problem: Problem, explanation: Explana
     rows = problem.chain.history
     step_s = 0.5 * rows.sample_time_s
     later_mm = moved(rows, rows.input_mm, step_s) - moved(rows, rows.input_mm, -step_s)
-    # Zero, scale and time of the input are free beside a clock that was found from the motion.
-    free = np.stack([lost_mm, np.ones_like(lost_mm), rows.input_mm, later_mm], axis=1)
     apart_mm = problem.chain.driven_mm(explanation.values) - narrow_mm
-    apart = float(np.linalg.lstsq(free, apart_mm, rcond=None)[0][0])
+    # Zero and scale of the input are free beside a clock that was found from the motion; its time is known to u.
+    compared = np.stack([lost_mm, np.ones_like(lost_mm), rows.input_mm, later_mm, apart_mm], axis=1)
+    slope = problem.chain.slope[: rows.input_mm.size, None]
+    white = problem.whitener.of_channel(slope * compared, 0)
+    known = np.array([0.0, 0.0, 0.0, 2.0 * step_s / clock.u_s, 0.0])
+    white = np.vstack([white, known])
+    apart = float(np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=None)[0][0])
     size = np.hypot(1.0, apart / np.sqrt(3.0))
     column = problem.chain.slope * np.tile(size * lost_mm, problem.chain.slope.size // lost_mm.size)
     return estimator.with_errors(explanation, problem.whitener.one(column)[None, :])
