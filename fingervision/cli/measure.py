@@ -44,6 +44,7 @@ Files written to --out:
   gaps.csv      one row per frame: gap with its uncertainty, points, tips, or why there is no value
   summary.json  counts, statistics, settings, scale, what the uncertainty includes and what not
   gap.png       the gap over time
+  drive_log.csv with --drive: the stage's log on the recording's clock, which diagnose reads
   bodies.csv    with --mechanism: pose and status of every body and hinge, frame by frame
   flexures.csv  with --mechanism: thickness and place of every flexure at rest
   gauges.csv    with --gauges: one row per value, time_s,gauge,quantity,value,u,unit,status

@@ -18,7 +18,7 @@ from fingervision.diagnosis.inference.position_map import NAME, map_columns, set
 from fingervision.diagnosis.inference.posterior import beside_alternatives
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
 from fingervision.diagnosis.inference.random_effect_search import beside_gains, beside_map
-from fingervision.diagnosis.inference.record_errors import settled_with_records, with_clock_errors
+from fingervision.diagnosis.inference.record_errors import settled_with_records
 from fingervision.diagnosis.inference.search import Look, Searched, problem_of, refitted
 from fingervision.diagnosis.inference.search_state import ROUGH, Findings
 from fingervision.diagnosis.inference.signatures import signatures
@@ -138,7 +138,6 @@ def _settled(state: Searched, look: Look) -> Refitted:
     """Estimate the map and the gains, and compute every parameter's posterior."""
     data, found = state.data, state.found
     best, posterior = settled_with_records(data, found.problem, found.best, look.rng)
-    best = with_clock_errors(data, found.problem, best)
     found = found.with_best(beside_alternatives(found.problem, best, found.alternatives))
     if data.position_map is not None:
         data = replace(data, position_map=data.position_map.refitted(found.problem, best))

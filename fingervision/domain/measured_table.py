@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.short_repr import ShortRepr
+from fingervision.domain.drive import DriveHistory
 
 # A reference slot: an opening of known width in the fingers' plane, measured through the same camera and scale.
 
@@ -72,20 +73,19 @@ class RecordedPath(ShortRepr):
 
 @dataclass(frozen=True, slots=True)
 class FoundClock:
-    """Offset between the clocks of input and gap, and the play, as far as they were fitted to their common motion.
+    """Offset between the clocks of input and gap, and the stage's corners, as far as their common motion shows them.
 
     Parameters
     ----------
     u_s : float
         Standard uncertainty of the offset; 0 if both have the same clock, or if no uncertainty is stated.
-    play_mm, u_play_mm : float
-        Play that was fitted together with the offset, and its standard uncertainty. It contains the errors of the log
-        between its rows, which a table with the input at each frame does not show.
+    corner_s, u_corner_s : float
+        Duration of the stage's corners between two rows of the log, and its standard uncertainty.
     """
 
     u_s: float = 0.0
-    play_mm: float = 0.0
-    u_play_mm: float = 0.0
+    corner_s: float = 0.0
+    u_corner_s: float = 0.0
 
 
 ONE_CLOCK = FoundClock()
@@ -120,6 +120,8 @@ class MeasuredTable(ShortRepr):
         All rows with an input, including those without a gap; None if every row has a gap, or without times.
     clock : FoundClock
         What was found about the clocks of input and gap from the motion in this table.
+    log : DriveHistory or None
+        The drive's log from which the input was read, on the clock of the gap; None if both were read together.
     stamp_s : float
         Resolution (s) of the times at which the input was read from a log; 0 if input and gap were read together, or
         if the times are not rounded.
@@ -139,6 +141,7 @@ class MeasuredTable(ShortRepr):
     slots: tuple[ReferenceSlot, ...] = ()
     path: RecordedPath | None = None
     clock: FoundClock = ONE_CLOCK
+    log: DriveHistory | None = None
     stamp_s: float = 0.0
     channels: Mapping[str, Channel] = field(default_factory=lambda: MappingProxyType({}))
 

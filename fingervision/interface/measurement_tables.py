@@ -12,6 +12,7 @@ from fingervision.domain.needed_library import needed_library
 from fingervision.domain.status import Status
 from fingervision.interface.column_tables import measured_from_columns
 from fingervision.measuring.in_memory import MeasuredInMemory
+from fingervision.measuring.outcome import log_on_the_recording
 from fingervision.motion.clock.clock_offset import ClockOffset
 from fingervision.motion.time_stamps import frame_resolution_s
 from fingervision.storage.beside import response_note
@@ -66,8 +67,8 @@ def measured_table(found: MeasuredInMemory) -> MeasuredTable:
     stamp_s = 0.0 if table.time_s is None else frame_resolution_s(table.time_s)
     found_clock = ONE_CLOCK
     if isinstance(clock, ClockOffset):
-        found_clock = FoundClock(clock.u_time_s, clock.play_mm, clock.u_play_mm)
-    return replace(table, clock=found_clock, stamp_s=stamp_s)
+        found_clock = FoundClock(clock.u_time_s, clock.corner_s, clock.u_corner_s)
+    return replace(table, clock=found_clock, log=log_on_the_recording(clock, task), stamp_s=stamp_s)
 
 
 def dataframe(found: MeasuredInMemory) -> "pd.DataFrame":

@@ -58,6 +58,8 @@ def in_words(clock: ClockOffset | NoClockOffset | None, given_s: float | None) -
             "u_drive_time_s": clock.u_time_s,
             "drive_play_mm": clock.play_mm,
             "u_drive_play_mm": clock.u_play_mm,
+            "drive_corner_s": clock.corner_s,
+            "u_drive_corner_s": clock.u_corner_s,
             "drive_explained_share": clock.explained_share,
             "drive_runner_up_s": clock.runner_up_s,
         }

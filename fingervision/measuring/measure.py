@@ -14,7 +14,7 @@ from fingervision.gauges.recording import GaugeRecording
 from fingervision.measuring.drive_clock import join_drive
 from fingervision.measuring.frame_loop import Progress, measure_frames, prepared
 from fingervision.measuring.gap_figure import draw_gap
-from fingervision.measuring.outcome import clock_drawn, clock_for, summary_of, undriven
+from fingervision.measuring.outcome import clock_drawn, clock_for, log_on_the_recording, summary_of, undriven
 from fingervision.measuring.output_folder import OutputFolder, claimed, held
 from fingervision.measuring.overlay_video import OverlayVideo
 from fingervision.measuring.rows import Result
@@ -22,6 +22,7 @@ from fingervision.measuring.series import GapSeries
 from fingervision.measuring.step_pictures import write_steps
 from fingervision.measuring.task import Task, task_for_frames
 from fingervision.motion.clock.clock_offset import ClockOffset
+from fingervision.storage.drive_csv import write_drive_log
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
 from fingervision.storage.summary_json import write_summary
 
@@ -137,6 +138,8 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
     clock = clock_for(series, task)
     if isinstance(clock, ClockOffset) and task.drive is not None:
         join_drive(folder.gaps, task.drive, clock)
+    if (log := log_on_the_recording(clock, task)) is not None:
+        write_drive_log(folder.drive_log, log)
     draw_gap(folder.figure, series, task.drive, clock_drawn(clock, task))
     summary = summary_of(how, task, series, clock, complete=not stopped)
     if gauges is not None:

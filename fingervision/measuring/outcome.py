@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError
 from fingervision.domain.status import Status
 from fingervision.measuring.drive_clock import clock_of, refusal, sentence
@@ -28,6 +29,16 @@ def clock_for(series: GapSeries, task: Task) -> Clock:
 def clock_drawn(clock: Clock, task: Task) -> ClockOffset | float | None:
     """Clock offset with which the plot shows the drive: found, given, or None."""
     return clock if isinstance(clock, ClockOffset) else task.drive_offset_s
+
+
+def log_on_the_recording(clock: Clock, task: Task) -> DriveHistory | None:
+    """The drive's log on the recording's clock; None without a drive, or without an offset."""
+    if task.drive is None:
+        return None
+    if isinstance(clock, ClockOffset):
+        return clock.on_the_recording(task.drive)
+    given_s = task.drive_offset_s
+    return None if given_s is None else replace(task.drive, time_s=task.drive.time_s + given_s)
 
 
 def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, complete: bool) -> dict[str, Any]:

@@ -14,9 +14,10 @@ from fingervision.gauges.recording import GaugeRecording
 from fingervision.measuring.gap_figure import draw_gap
 from fingervision.measuring.in_memory import MeasuredInMemory
 from fingervision.measuring.marked import marked
-from fingervision.measuring.outcome import clock_drawn
+from fingervision.measuring.outcome import clock_drawn, log_on_the_recording
 from fingervision.measuring.overlay_video import OverlayVideo
 from fingervision.measuring.step_pictures import write_steps
+from fingervision.storage.drive_csv import DRIVE_LOG, write_drive_log
 from fingervision.storage.gaps_csv import COLUMNS, GapsCsv
 from fingervision.storage.gauge_files import GaugeRows, GaugesCsv
 from fingervision.storage.out_folder import FolderLock, make_out_folder, out_folder
@@ -42,6 +43,11 @@ class OutputFolder:
     def gauges(self) -> Path:
         """Path of the table of the gauges."""
         return self.path / GAUGES
+
+    @property
+    def drive_log(self) -> Path:
+        """Path of the drive's log on the recording's clock."""
+        return self.path / DRIVE_LOG
 
     @property
     def summary(self) -> Path:
@@ -81,7 +87,7 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
     UsageError
         The folder is where the recording's images are, or the recording would be replaced.
     """
-    names = (GAPS, GAUGES, SUMMARY, FIGURE, OVERLAY, STEPS)
+    names = (GAPS, GAUGES, DRIVE_LOG, SUMMARY, FIGURE, OVERLAY, STEPS)
     for file in recording_files:
         same = file.resolve().parent == path.resolve()
         if same and (len(recording_files) > 1 or file.name in names):
@@ -188,6 +194,8 @@ def save_measured(
                     f"--steps must be the number of a frame that can be read, but frame {steps_frame} cannot."
                 )
             write_steps(wanted, found.how.settings, folder.steps)
+        if (log := log_on_the_recording(found.clock, task)) is not None:
+            write_drive_log(folder.drive_log, log)
         draw_gap(folder.figure, series, task.drive, clock_drawn(found.clock, task))
         write_summary(folder.summary, found.summary)
     return folder

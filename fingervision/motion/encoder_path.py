@@ -250,7 +250,13 @@ def piece(
     at_s = np.array([one.at_s for one in found])
     fine_s = _points(time_s, at_s)
     interval = np.clip(np.searchsorted(time_s, fine_s, side="right") - 1, 0, time_s.size - 2)
+    # At a corner on a row, the slope of Akima's curve is that of either side, depending on the rounding of times: the
+    # curve then leaves both straight lines by a seventh of the way between two rows.
+    beside = np.maximum(np.append(second[1:], 0.0), np.insert(second[:-1], 0, 0.0))
+    sharp = second > SHARP * np.maximum(beside, u_mm)
     fine_mm = _curve(time_s, input_mm, fine_s, interval)
+    chord_mm = np.interp(fine_s, time_s, input_mm)
+    fine_mm = np.where((sharp[1:] | sharp[:-1])[interval], chord_mm, fine_mm)
     for one in found:
         inside = (fine_s >= time_s[one.first]) & (fine_s <= time_s[one.last])
         fine_mm[inside] = one.input_mm(fine_s[inside])

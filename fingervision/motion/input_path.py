@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fingervision.domain.effect import Array, Flags, History, InputPath
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.motion.corners import Corner, corners
+from fingervision.motion.log_path import LogPath
 
 # Where the stage turned between two rows, as far as the rows beside the reversals show it.
 
@@ -257,6 +258,71 @@ def input_path(
     path_runs = tuple(slice(begin, end) for begin, end in pairwise(borders))
     along = replace(history, input_mm=inputs[order], time_s=times[order], runs=path_runs)
     return InputPath(along, np.searchsorted(places[order], rows), owners[order])
+
+
+def log_at(log: LogPath, values: Array, table: MeasuredTable) -> Array:
+    """Read values along the path of a log at every recorded row; beyond the ends of a run their slope continues.
+
+    Parameters
+    ----------
+    log : LogPath
+        The path.
+    values : ndarray of float, shape (p,)
+        Values at its points.
+    table : MeasuredTable
+        The table, with times.
+
+    Returns
+    -------
+    ndarray of float, shape (m,)
+    """
+    input_mm, time_s, runs = recorded(table)
+    out = np.empty(input_mm.size)
+    for run, points in zip(runs, log.runs(table.run_names), strict=True):
+        if time_s is not None:
+            out[run] = continued(time_s[run], log.drive.time_s[points], values[points])
+    return out
+
+
+def continued(at_s: Array, time_s: Array, values: Array) -> Array:
+    """Interpolate values at rising times; beyond the first and the last time their slope continues."""
+    out = np.interp(at_s, time_s, values)
+    apart = np.flatnonzero(np.diff(time_s) > 0.0)
+    for end, k, outside in ((0, apart[:1], at_s < time_s[0]), (-1, apart[-1:], at_s > time_s[-1])):
+        slope = np.diff(values)[k] / np.diff(time_s)[k]
+        out += np.where(outside, slope.sum() * (at_s - time_s[end]), 0.0)
+    return out
+
+
+def log_input_path(log: LogPath, table: MeasuredTable, history: History) -> InputPath:
+    """Join the path between the rows of a log with the measured rows, so that effects with memory see both.
+
+    Parameters
+    ----------
+    log : LogPath
+        The path.
+    table : MeasuredTable
+        The measured table, with times.
+    history : History
+        History of the measured rows, with the input of the path.
+    """
+    inputs, times, owners, rows, runs = [], [], [], [], []
+    begin = 0
+    for run, points in zip(history.runs, log.runs(table.run_names), strict=True):
+        time_s, path_s = history.times[run], log.drive.time_s[points]
+        during = slice(*np.searchsorted(path_s, [time_s[0], time_s[-1]]))
+        every_s = np.concatenate([path_s[during], time_s])
+        order = np.argsort(every_s, kind="stable")
+        every_s = every_s[order]
+        inputs.append(np.concatenate([log.drive.input_mm[points][during], history.input_mm[run]])[order])
+        times.append(every_s)
+        middles_s = 0.5 * (time_s[1:] + time_s[:-1])
+        owners.append(run.start + np.searchsorted(middles_s, every_s, side="right"))
+        rows.append(begin + np.flatnonzero(order >= order.size - time_s.size))
+        runs.append(slice(begin, begin + order.size))
+        begin += order.size
+    along = replace(history, input_mm=np.concatenate(inputs), time_s=np.concatenate(times), runs=tuple(runs))
+    return InputPath(along, np.concatenate(rows), np.concatenate(owners))
 
 
 def _beside_jumps(along_mm: Array, time_s: Array, runs: tuple[slice, ...], rest: Flags) -> NDArray[np.intp]:

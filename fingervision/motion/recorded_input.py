@@ -8,8 +8,9 @@ import numpy as np
 from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import Model
-from fingervision.motion.input_path import mostly_at_rest, recorded
+from fingervision.motion.input_path import log_at, mostly_at_rest, recorded
 from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
+from fingervision.motion.log_path import LogPath
 from fingervision.motion.time_stamps import input_error_of_stamps
 
 # Distinguish step commands from encoder readings: both stay constant and jump while the stage moves slowly.
@@ -109,6 +110,8 @@ class RecordedInput:
         Whether the record is a command that keeps its value until it jumps.
     stamps_mm : ndarray of float, shape (n,), or None
         Effect on the gap of the rounding of the frames' times, independent from row to row; None if there is none.
+    log : LogPath or None
+        Path between the rows of the log from which the input was read; None without a log of a motion.
     """
 
     smooth_mm: Array
@@ -121,6 +124,7 @@ class RecordedInput:
     is_motion: bool = False
     commanded: bool = False
     stamps_mm: Array | None = None
+    log: LogPath | None = None
 
     @classmethod
     def exact(cls, table: MeasuredTable, *, is_motion: bool = False, commanded: bool = False) -> "RecordedInput":
@@ -161,6 +165,9 @@ class RecordedInput:
         ahead, behind = (model.respond(smooth[rows] + way).gap_mm for way in (reach, -reach))
         slope = np.abs(ahead - behind) / (2.0 * reach)
         stamps_mm = slope * input_error_of_stamps(smooth, time_s, runs, table.stamp_s)[rows] if table.stamp_s else None
+        if table.log is not None and not is_motion:
+            log = LogPath.of(table.log).rounded(table.clock.corner_s)
+            return cls.logged(table, replace(log, u_corner_s=table.clock.u_corner_s).thinned(), slope, stamps_mm)
         if exact:
             kept = cls.exact(table, is_motion=is_motion)
             return replace(kept, sigma_mm=noise_mm, error_mm=slope * noise_mm, stamps_mm=stamps_mm)
@@ -173,6 +180,43 @@ class RecordedInput:
             )
         error = slope * sigma * np.sqrt(leverage[rows])
         return cls(smooth[rows], smooth, sigma, step, error, stays[rows], samples, stamps_mm=stamps_mm)
+
+    @classmethod
+    def logged(cls, table: MeasuredTable, log: LogPath, slope: Array, stamps_mm: Array | None) -> "RecordedInput":
+        """Read the input of each row from the path between the rows of its log, with the uncertainty of that path.
+
+        Parameters
+        ----------
+        table : MeasuredTable
+            The measured table.
+        log : LogPath
+            The path.
+        slope : ndarray of float, shape (n,)
+            Change of the gap per change of the input.
+        stamps_mm : ndarray of float, shape (n,), or None
+            Effect on the gap of the rounding of the frames' times.
+        """
+        along_mm = log_at(log, log.drive.input_mm, table)
+        smooth_mm = along_mm[table.path_rows]
+        _, time_s, _ = recorded(table)
+        if time_s is None:
+            raise ValueError
+        u_mm = log_at(log, log.u_mm, table)[table.path_rows]
+        shared_mm = log.shared.u_mm[np.searchsorted(log.shared.begin_s, time_s[table.path_rows], side="right")]
+        stays = np.ones(smooth_mm.size, dtype=bool)
+        passing_mm = slope * u_mm if stamps_mm is None else np.hypot(stamps_mm, slope * u_mm)
+        sigma_mm = max(float(np.median(u_mm)), log.step_mm / float(np.sqrt(12.0)))
+        return cls(
+            smooth_mm,
+            along_mm,
+            sigma_mm,
+            log.step_mm,
+            slope * shared_mm,
+            stays,
+            HELD_SAMPLES,
+            stamps_mm=passing_mm,
+            log=log,
+        )
 
 
 def standing_still(history: History, least_rows: int) -> tuple[slice, ...]:

@@ -4,14 +4,21 @@ These files are optional: a folder without them, or one of another program, says
 """
 
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fingervision.domain.camera import Origin
+from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.measured_table import ONE_CLOCK, FoundClock, ReferenceSlot
+from fingervision.motion.drive_at import drive_at
 from fingervision.storage.csv_columns import read_columns
+from fingervision.storage.drive_csv import DRIVE_LOG, read_drive
+from fingervision.storage.gaps_csv import MM_PLACES, TIME_PLACES
 from fingervision.storage.plain_file import json_of
 from fingervision.storage.run_files import RUN
 from fingervision.storage.summary_json import GAPS, SUMMARY
@@ -52,12 +59,47 @@ def clock_beside(table: Path) -> FoundClock:
         if settings["drive_offset"] != "found":
             return ONE_CLOCK
         u_s = float(settings["u_drive_time_s"])
-        # Summaries of older versions state no play.
-        play_mm, u_play_mm = (float(settings.get(name, 0.0)) for name in ("drive_play_mm", "u_drive_play_mm"))
+        # Summaries of older versions state no corners.
+        corner_s, u_corner_s = (float(settings.get(name, 0.0)) for name in ("drive_corner_s", "u_drive_corner_s"))
     except (ValueError, LookupError, TypeError):
         return ONE_CLOCK
-    known = 0.0 < u_s < float("inf") and 0.0 <= play_mm < float("inf") and 0.0 <= u_play_mm < float("inf")
-    return FoundClock(u_s, play_mm, u_play_mm) if known else ONE_CLOCK
+    known = 0.0 < u_s < float("inf") and 0.0 <= corner_s < float("inf") and 0.0 <= u_corner_s < float("inf")
+    return FoundClock(u_s, corner_s, u_corner_s) if known else ONE_CLOCK
+
+
+def log_beside(
+    table: Path, time_s: NDArray[np.float64] | None, input_mm: NDArray[np.float64], runs: Collection[str]
+) -> DriveHistory | None:
+    """The drive's log on the recording's clock, beside a gaps.csv whose inputs were read from it.
+
+    Parameters
+    ----------
+    table : Path
+        A gaps.csv, or any other table.
+    time_s, input_mm : ndarray of float, shape (n,)
+        Times and inputs of the table; None without times.
+    runs : collection of str
+        Names of its runs.
+
+    Returns
+    -------
+    DriveHistory or None
+        None for any other table, or if an input of the table is not that of the log.
+    """
+    file = table.parent / DRIVE_LOG
+    if table.name != GAPS or time_s is None or not file.is_file():
+        return None
+    try:
+        log = read_drive(file)
+    except FingervisionError:
+        return None
+    if log.run is not None and not set(runs) <= set(log.run):
+        return None
+    states = [drive_at(log, at_s) for at_s in time_s.tolist()]
+    read_mm = np.array([np.inf if state is None else state.input_mm for state in states])
+    speeds = np.abs(np.diff(log.input_mm)) / np.maximum(np.diff(log.time_s), 10.0**-TIME_PLACES)
+    rounding_mm = 10.0**-MM_PLACES + 10.0**-TIME_PLACES * float(speeds.max(initial=0.0))
+    return log if np.all(np.abs(read_mm - input_mm) <= rounding_mm) else None
 
 
 def response_note(summary: Mapping[str, Any], shifts_px: Iterable[float]) -> tuple[str, ...]:

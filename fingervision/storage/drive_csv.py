@@ -15,7 +15,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.field import Field, names_of
 from fingervision.domain.status import Status
 from fingervision.storage.csv_columns import read_columns
-from fingervision.storage.durable import replaced
+from fingervision.storage.durable import replaced, written
 from fingervision.storage.plain_file import plain
 from fingervision.storage.row_file import RowFile, line_of, row_of
 
@@ -81,6 +81,31 @@ def drive_rows(
                     f"{path}."
                 )
     return DriveHistory(times, values["input_mm"], runs, values.get("force_n"))
+
+
+DRIVE_LOG = "drive_log.csv"
+"""The drive's log on the recording's clock, in the folder of gaps.csv."""
+LOG_TIME_PLACES = 9
+
+
+def write_drive_log(path: Path, drive: DriveHistory) -> None:
+    """Write a log with the digits of its inputs, from which the step of an encoder is found.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    names = ["time_s", "input_mm", *(["run"] if drive.run is not None else [])]
+    runs = drive.run if drive.run is not None else [None] * drive.time_s.size
+    with (
+        written(path, "free disk space or name another folder with --out, and measure again") as part,
+        part.open("w", encoding="utf-8", newline="") as file,
+    ):
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(names)
+        for time_s, input_mm, run in zip(drive.time_s.tolist(), drive.input_mm.tolist(), runs, strict=True):
+            rows.writerow([f"{time_s:.{LOG_TIME_PLACES}f}", input_mm, run][: len(names)])
 
 
 # The file samples.csv of a run on the test bed: a measured table with additional columns.

@@ -11,7 +11,7 @@ from fingervision.domain.errors import DataError
 from fingervision.domain.field import declared
 from fingervision.domain.measured_table import Channel, MeasuredTable, RecordedPath
 from fingervision.motion.time_stamps import frame_resolution_s
-from fingervision.storage.beside import clock_beside, measurement_beside, response_note_beside, slots_beside
+from fingervision.storage.beside import clock_beside, log_beside, measurement_beside, response_note_beside, slots_beside
 from fingervision.storage.csv_columns import Numbers, read_columns
 from fingervision.storage.gaps_csv import GapRow
 
@@ -178,6 +178,7 @@ def measured_rows(
         slots=slots_beside(path),
         path=along,
         clock=clock_beside(path),
+        log=log_beside(path, column.get("time_s"), column["input_mm"], run_names),
         stamp_s=frame_resolution_s(time) if time is not None and measurement_beside(path) else 0.0,
         channels=channels_of(channels, kept[order]),
     )

@@ -73,7 +73,8 @@ def named_play(one, drive, clock):
     inputs = np.array(over)
     half = 0.5 * (1.2 + 7.72 * inputs)
     model = CorrectedModel("drawn", TableModel("drawn", inputs, -half, half), "drawn.csv", over, {})
-    table = replace(measured_from_columns(columns), clock=FoundClock(clock.u_time_s, clock.play_mm, clock.u_play_mm))
+    found = FoundClock(clock.u_time_s, clock.corner_s, clock.u_corner_s)
+    table = replace(measured_from_columns(columns), clock=found, log=clock.on_the_recording(drive))
     try:
         report = diagnose(table, model).report
     except FingervisionError as error:

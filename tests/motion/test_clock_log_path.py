@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.motion.clock.corner_rounding import rounded
 from fingervision.motion.clock.noise import even_variance
 from fingervision.motion.encoder import input_sigma, on_lines
 from fingervision.motion.log_path import LogPath
@@ -76,7 +75,7 @@ def test_a_rounded_turn_between_two_rows_is_drawn_finely_enough_for_the_play():
     corners = np.arange(-0.99, 14.0, 2.04)  # half-way between two rows
     tops = np.where(np.arange(corners.size) % 2, speed, 0.0)
     path = LogPath.of(DriveHistory(time_s, np.interp(time_s, corners, tops)))
-    turned = rounded(path, corner_s)
+    turned = path.rounded(corner_s)
     slope = np.diff(tops)[0] / np.diff(corners)[0]
     for at_s, top in zip(corners[1:-2], tops[1:-2], strict=True):
         near = np.linspace(-0.7, 0.7, 57) * corner_s

@@ -175,7 +175,7 @@ def test_wrong_gaps_here_and_there_do_not_move_it():
 
 def test_the_uncertainty_is_read_from_the_summary_beside_a_table(tmp_path):
     found = FoundClock(0.0125, 0.03, 0.0004)
-    settings = {"drive_offset": "found", "u_drive_time_s": 0.0125, "drive_play_mm": 0.03, "u_drive_play_mm": 0.0004}
+    settings = {"drive_offset": "found", "u_drive_time_s": 0.0125, "drive_corner_s": 0.03, "u_drive_corner_s": 0.0004}
     (tmp_path / "summary.json").write_text(json.dumps({"settings": settings}))
     assert clock_beside(tmp_path / "gaps.csv") == found
     assert clock_beside(tmp_path / "other.csv") == ONE_CLOCK

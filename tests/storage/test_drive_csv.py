@@ -5,8 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError, InputFileError
-from fingervision.storage.drive_csv import read_drive
+from fingervision.motion.drive_at import drive_at
+from fingervision.storage.drive_csv import read_drive, write_drive_log
+from fingervision.storage.measured_table import read_measured_table
 
 
 def table(path: Path, text: str) -> Path:
@@ -59,3 +62,25 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
     (tmp_path / "drive.csv").write_bytes(b"\xff\xfe\x00\x81" * 10)
     with pytest.raises(DataError, match="must be a CSV table in UTF-8"):
         read_drive(tmp_path / "drive.csv")
+
+
+def test_the_log_beside_a_table_is_read_while_the_table_has_its_inputs(tmp_path: Path) -> None:
+    rng = np.random.default_rng(12)
+    log = DriveHistory(np.cumsum(rng.uniform(0.05, 0.15, 60)), np.cumsum(rng.uniform(-0.1, 0.3, 60)), ("out",) * 60)
+    write_drive_log(tmp_path / "drive_log.csv", log)
+    times = np.arange(0.5, 3.0, 0.04)
+    states = [drive_at(log, at_s) for at_s in times.tolist()]
+    lines = [f"{at:.9f},{1.0 + s.input_mm:.7f},out,{s.input_mm:.7f}" for at, s in zip(times, states, strict=True) if s]
+    text = "\n".join(["time_s,gap_mm,run,input_mm", *lines]) + "\n"
+    table = tmp_path / "gaps.csv"
+    table.write_text(text)
+    found = read_measured_table(table).log
+    assert found is not None
+    np.testing.assert_allclose(found.time_s, log.time_s, atol=1e-9)
+    np.testing.assert_array_equal(found.input_mm, log.input_mm)
+    table.write_text(text.replace(",out,", ",back,"))
+    assert read_measured_table(table).log is None
+    table.write_text(text.replace(lines[7], f"{lines[7].rpartition(',')[0]},0.5"))
+    assert read_measured_table(table).log is None
+    (tmp_path / "other.csv").write_text(text)
+    assert read_measured_table(tmp_path / "other.csv").log is None

@@ -140,6 +140,13 @@ class MeasuringChain:
         path = None if self.path is None else self.path.moved(input_mm - self.history.input_mm)
         return replace(self, history=replace(self.history, input_mm=input_mm), path=path)
 
+    def along_errors(self, error_mm: Array) -> "MeasuringChain":
+        """Return the chain with an input that differs along its path; `error_mm` of shape (m,)."""
+        along = self.along
+        path = replace(along, history=replace(along.history, input_mm=along.history.input_mm + error_mm))
+        history = replace(self.history, input_mm=self.history.input_mm + error_mm[along.rows])
+        return replace(self, history=history, path=path)
+
     @cached_property
     def along(self) -> InputPath:
         """Path of the input; the measured rows themselves if they contain all of it."""

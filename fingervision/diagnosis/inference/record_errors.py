@@ -1,6 +1,6 @@
 """Uncertainty of estimates from errors of the recorded input, by simulated repetition of the recording."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from fingervision.diagnosis.inference.hypothesis import START_VARIANCE, Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import derivatives, refit
+from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.input.observations import Observations
-from fingervision.diagnosis.input.record_nuisances import moved
 from fingervision.diagnosis.noise.channel_noises import (
     CORRELATIONS,
     LINE,
@@ -22,9 +22,9 @@ from fingervision.diagnosis.noise.channel_noises import (
 )
 from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
-from fingervision.effects.play_operator import play
 from fingervision.motion.input_path import recorded
 from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
+from fingervision.motion.log_path import drawn_paths
 from fingervision.motion.recursion import recursion
 
 FEWEST_POWERS = 20
@@ -134,21 +134,23 @@ def settled_with_records(
     found : tuple of dict
         Draws from the posterior.
     """
-    if data.turning is None or not explanation.names:
+    whitener, has_log = problem.whitener, data.recorded.log is not None
+    is_uncertain = has_log or whitener.input_mm.any() or whitener.passing_mm.any()
+    again = list(simulated_records(data, rng)) if is_uncertain else []
+    if (data.turning is None and not has_log) or not explanation.names:
         best, found = settled(problem, explanation, rng)
-        return with_record_errors(problem, best, simulated_errors(data, rng)), found
-    errors_mm = list(simulated_errors(data, rng))
-    alone = _with_picture_noise(data, problem, explanation, errors_mm)
+        return with_record_errors(problem, best, again), found
+    alone = _with_picture_noise(data, problem, explanation, again)
     best, found = settled(alone, refit(alone, explanation), rng)
     # A residual above the assumed noise widens the intervals (Birge 1932).
     rows = max(1, problem.rows - best.free)
     best = replace(best, covariance=best.covariance * max(1.0, best.score / rows))
-    best = with_record_errors(alone, best, errors_mm, assumed_mm=_assumed(alone, rng))
+    best = with_record_errors(alone, best, again, assumed_mm=_assumed(alone, rng))
     return problem.judged(best, best.values), found
 
 
 def _with_picture_noise(
-    data: Observations, problem: Problem, explanation: Explanation, errors_mm: list[Array]
+    data: Observations, problem: Problem, explanation: Explanation, again: list[MeasuringChain]
 ) -> Problem:
     """Return the problem with a noise of the gap that does not contain the errors of an encoder's record.
 
@@ -162,7 +164,7 @@ def _with_picture_noise(
     n = history.input_mm.size
     seen = turning.apart * problem.chain.slope[:n]
     residual_mm = turning.apart * (data.stacked_mm - problem.chain.stacked(explanation.values))[:n]
-    of_input = np.array(errors_mm) * seen
+    of_input = np.array([one.history.input_mm - history.input_mm for one in again]) * seen
     aside = whitener.aside[:n]
     noise = picture_noise(
         residual_mm, of_input, history.runs, 1.0 / history.sample_time_s, aside, whitener.noises[0], data.floors_mm[0]
@@ -171,7 +173,7 @@ def _with_picture_noise(
 
 
 def with_record_errors(
-    problem: Problem, explanation: Explanation, errors_mm: Iterable[Array], *, assumed_mm: Sequence[Array] = ()
+    problem: Problem, explanation: Explanation, again: Sequence[MeasuringChain], *, assumed_mm: Sequence[Array] = ()
 ) -> Explanation:
     """Add the contribution of errors of the recorded input to the covariance of an explanation.
 
@@ -187,24 +189,19 @@ def with_record_errors(
     explanation : Explanation
         Explanation with its covariance. The covariance of a parameter is kept if the parameter is held constant, or if
         the prediction depends on it discontinuously.
-    errors_mm : iterable of ndarray of float, shape (n,)
-        Errors of the smoothed input in simulated repetitions of the recording.
+    again : sequence of MeasuringChain
+        Measuring chains with the input of simulated repetitions of the recording.
     assumed_mm : sequence of ndarray of float, shape (m,)
         Draws of the gap's errors that the likelihood assumes for the input, if the simulated ones are to replace them.
     """
     whitener = problem.whitener
-    if not explanation.names or not (whitener.input_mm.any() or whitener.passing_mm.any()):
+    if not explanation.names or not again:
         return explanation
     estimator = _Estimator.of(problem, explanation)
     if estimator is None:
         return explanation
-    truth, input_mm = problem.chain.stacked(explanation.values), problem.chain.history.input_mm
-    away = [
-        whitener.one(truth - problem.chain.with_input(input_mm + error_mm).stacked(explanation.values))
-        for error_mm in errors_mm
-    ]
-    if not away:
-        return explanation
+    truth = problem.chain.stacked(explanation.values)
+    away = [whitener.one(truth - one.stacked(explanation.values)) for one in again]
     covariance = explanation.covariance.copy()
     if assumed_mm:
         own = estimator.own
@@ -212,43 +209,6 @@ def with_record_errors(
         left = np.sqrt(np.clip(1.0 - assumed / np.maximum(estimator.variances, 1e-300), LEAST_LEFT, 1.0))
         covariance[np.ix_(own, own)] *= np.outer(left, left)
     return estimator.with_errors(replace(explanation, covariance=covariance), np.array(away))
-
-
-def with_clock_errors(data: Observations, problem: Problem, explanation: Explanation) -> Explanation:
-    """Add what the play beside a clock leaves uncertain to the covariance of an explanation.
-
-    The clock was fitted to the log itself, whose errors between its rows, such as the rounding of an encoder or of a
-    reversal, are common to all frames of a stroke. A table with the input at each frame does not show them: of 24
-    simulated plays (`tests.benchmarks.clock --laboratory --plays --seed 7301`), 10 differed from the truth by more than
-    2 u. They act as a play that is wider or narrower by the uncertainty of the clock's play. What the explanation loses
-    along straight lines between the frames may differ from the clock's play, along the log; the truth may lie anywhere
-    between the two.
-    """
-    clock, history = data.table.clock, problem.chain.along.history
-    if clock.u_play_mm == 0.0 or not explanation.names:
-        return explanation
-    estimator = _Estimator.of(problem, explanation)
-    if estimator is None:
-        return explanation
-    narrow_mm, wide_mm = (
-        np.concatenate([play(history.input_mm[run], width_mm, 0.0) for run in history.runs])[problem.chain.along.rows]
-        for width_mm in (clock.play_mm, clock.play_mm + clock.u_play_mm)
-    )
-    lost_mm = wide_mm - narrow_mm
-    rows = problem.chain.history
-    step_s = 0.5 * rows.sample_time_s
-    later_mm = moved(rows, rows.input_mm, step_s) - moved(rows, rows.input_mm, -step_s)
-    apart_mm = problem.chain.driven_mm(explanation.values) - narrow_mm
-    # Zero and scale of the input are free beside a clock that was found from the motion; its time is known to u.
-    compared = np.stack([lost_mm, np.ones_like(lost_mm), rows.input_mm, later_mm, apart_mm], axis=1)
-    slope = problem.chain.slope[: rows.input_mm.size, None]
-    white = problem.whitener.of_channel(slope * compared, 0)
-    known = np.array([0.0, 0.0, 0.0, 2.0 * step_s / clock.u_s, 0.0])
-    white = np.vstack([white, known])
-    apart = float(np.linalg.lstsq(white[:, :-1], white[:, -1], rcond=None)[0][0])
-    size = np.hypot(1.0, apart / np.sqrt(3.0))
-    column = problem.chain.slope * np.tile(size * lost_mm, problem.chain.slope.size // lost_mm.size)
-    return estimator.with_errors(explanation, problem.whitener.one(column)[None, :])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -315,10 +275,19 @@ def _autoregression(phi: float, count: int, rng: np.random.Generator) -> Array:
     return recursion(phi, shocks)
 
 
-def simulated_errors(data: Observations, rng: np.random.Generator) -> Iterator[Array]:
-    """Errors of the smoothed input in simulated repetitions of the recording; each of shape (n,) (mm)."""
-    record, (_, time_s, runs) = data.recorded, recorded(data.table)
+def simulated_records(data: Observations, rng: np.random.Generator) -> Iterator[MeasuringChain]:
+    """Measuring chains with the input of simulated repetitions of the recording; none of a record without errors."""
+    record, chain, (_, time_s, runs) = data.recorded, data.chain, recorded(data.table)
     if time_s is None:
+        return
+    if record.log is not None:
+        along = chain.along
+        for drawn in drawn_paths(record.log):
+            error_mm = np.empty(along.history.input_mm.size)
+            for run, points in zip(along.history.runs, record.log.runs(data.table.run_names), strict=True):
+                away_mm = drawn.drive.input_mm[points] - record.log.drive.input_mm[points]
+                error_mm[run] = np.interp(along.history.times[run], record.log.drive.time_s[points], away_mm)
+            yield chain.along_errors(error_mm)
         return
     path_mm, step_mm = record.along_mm, record.step_mm
     noise_mm = float(np.sqrt(max(0.0, record.sigma_mm**2 - step_mm**2 / 12.0)))
@@ -329,4 +298,4 @@ def simulated_errors(data: Observations, rng: np.random.Generator) -> Iterator[A
             zero = rng.random()
             read_mm = (np.round(read_mm / step_mm - zero) + zero) * step_mm
         again = SmoothedRecord.known(read_mm, time_s, runs, record.sigma_mm, step_mm)
-        yield (again.path_mm - path_mm)[data.table.path_rows]
+        yield chain.with_input(chain.history.input_mm + (again.path_mm - path_mm)[data.table.path_rows])

@@ -30,7 +30,10 @@ from fingervision.motion.clock.noise import even_variance
 from fingervision.motion.input_path import (
     NO_TURNS,
     UnseenTurns,
+    continued,
     input_path,
+    log_at,
+    log_input_path,
     recorded,
     turning_readings,
     unseen_turns,
@@ -338,10 +341,17 @@ class Observations:
         _, time_s, runs = recorded(self.table)
         if time_s is None or along.time_s is None:
             return self
-        along_mm = _later(along.input_mm, along, time_s, runs, by_s)
+        log = None if record.log is None else record.log.later(by_s)
+        if log is None:
+            along_mm = _later(along.input_mm, along, time_s, runs, by_s)
+        else:
+            along_mm = log_at(log, log.drive.input_mm, self.table)
         history = replace(self.chain.history, input_mm=along_mm[self.table.path_rows])
-        turns = unseen_turns(self.table, history, along_mm, commanded=record.commanded)
-        path = input_path(self.table, history, along_mm, commanded=record.commanded, turns=turns)
+        if log is None:
+            turns = unseen_turns(self.table, history, along_mm, commanded=record.commanded)
+            path = input_path(self.table, history, along_mm, commanded=record.commanded, turns=turns)
+        else:
+            turns, path = NO_TURNS, log_input_path(log, self.table, history)
         chain = replace(self.chain, history=history, path=path)
         if self.chain.dynamics is not None:
             there, answer = chain.along.history, self.chain.dynamics[1]
@@ -352,7 +362,7 @@ class Observations:
             force_n = None if answer.force_n is None else shifted(answer.force_n)
             answer = Response(shifted(answer.left_mm), shifted(answer.right_mm), force_n)
             chain = replace(chain, dynamics=(there.times, answer))
-        moved = replace(record, smooth_mm=history.input_mm, along_mm=along_mm)
+        moved = replace(record, smooth_mm=history.input_mm, along_mm=along_mm, log=log)
         return replace(self, chain=chain, recorded=moved, turns=turns, turning=TurningErrors.of(history))
 
     def turn_columns_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
@@ -450,10 +460,5 @@ def _later(values: Array, along: History, time_s: Array, runs: tuple[slice, ...]
     """
     out = np.empty(time_s.size)
     for run, points in zip(runs, along.runs, strict=True):
-        at_s, known_s, known = time_s[run] - by_s, along.times[points], values[points]
-        out[run] = np.interp(at_s, known_s, known)
-        apart = np.flatnonzero(np.diff(known_s) > 0.0)
-        for end, k, outside in ((0, apart[:1], at_s < known_s[0]), (-1, apart[-1:], at_s > known_s[-1])):
-            slope = np.diff(known)[k] / np.diff(known_s)[k]
-            out[run] += np.where(outside, slope.sum() * (at_s - known_s[end]), 0.0)
+        out[run] = continued(time_s[run] - by_s, along.times[points], values[points])
     return out

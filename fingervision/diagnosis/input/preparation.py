@@ -19,7 +19,7 @@ from fingervision.domain.model import Model, PhysicalModel
 from fingervision.domain.response import Response
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
-from fingervision.motion.input_path import dwell_s, input_path, mostly_at_rest, unseen_turns
+from fingervision.motion.input_path import NO_TURNS, dwell_s, input_path, log_input_path, mostly_at_rest, unseen_turns
 from fingervision.motion.input_path import recorded as recorded_rows
 from fingervision.motion.recorded_input import RecordedInput
 
@@ -86,8 +86,11 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     _refuse_other_inputs(table.input_mm, model.input_range_mm)
     recorded = RecordedInput.of(table, model.base, model.input_range_mm)
     history = _history(table, model, recorded)
-    turns = unseen_turns(table, history, recorded.along_mm, commanded=recorded.commanded)
-    path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded, turns=turns)
+    if recorded.log is None:
+        turns = unseen_turns(table, history, recorded.along_mm, commanded=recorded.commanded)
+        path = input_path(table, history, recorded.along_mm, commanded=recorded.commanded, turns=turns)
+    else:
+        turns, path = NO_TURNS, log_input_path(recorded.log, table, history)
     fixed = {name: {key: e.value for key, e in values.items()} for name, values in model.effects.items()}
     chain = MeasuringChain(model.base, history, fixed, path=path)
     if function is not None:

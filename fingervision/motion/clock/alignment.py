@@ -192,6 +192,8 @@ def stated(
         u_play_mm=float(
             np.sqrt((at.u_play_mm**2 + growth[2]) * more[2] ** 2 + shift[2] ** 2 + spread.covariance[2, 2])
         ),
+        corner_s=motion.path.corner_s,
+        u_corner_s=motion.path.u_corner_s,
         explained_share=share,
         notes=tuple(notes),
         runner_up_s=None if runner_up is None else runner_up.offset_s,

@@ -1,9 +1,10 @@
 """Relation between the clocks of a recording and of a log, or the reason why it could not be determined."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 
 
@@ -23,6 +24,8 @@ class ClockOffset:
         Standard uncertainty of the relation of the two clocks, as RMS over the frames that have an input.
     play_mm, u_play_mm : float
         Play, fitted together with the offset, with its standard uncertainty.
+    corner_s, u_corner_s : float
+        Duration of the stage's corners between two rows of the log, with its standard uncertainty.
     explained_share : float
         Share of the gap's variance that the log explains.
     notes : tuple of str
@@ -40,6 +43,8 @@ class ClockOffset:
     u_time_s: float
     play_mm: float
     u_play_mm: float
+    corner_s: float
+    u_corner_s: float
     explained_share: float
     notes: tuple[str, ...] = ()
     runner_up_s: float | None = None
@@ -51,6 +56,10 @@ class ClockOffset:
     def recording_time_s(self, log_time_s: Array) -> Array:
         """Convert times of the log to the recording's clock; shape (n,)."""
         return np.asarray(log_time_s + self.offset_s + self.rate * (log_time_s - self.reference_s))
+
+    def on_the_recording(self, drive: DriveHistory) -> DriveHistory:
+        """Return a log with its times on the recording's clock."""
+        return replace(drive, time_s=self.recording_time_s(drive.time_s))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ from fingervision.domain.effect import Array
 from fingervision.motion.clock.joint_fit import Fit, fit
 from fingervision.motion.clock.motion_model import Motion
 from fingervision.motion.clock.play_posterior import most_likely
-from fingervision.motion.log_path import LogPath
 
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
 """Durations of a corner that are tried, relative to the time between two rows; a longer duration would be visible in
@@ -55,17 +54,6 @@ class Spread:
         return Spread(self.shift + other.shift, self.covariance + other.covariance)
 
 
-def rounded(path: LogPath, corner_s: float) -> LogPath:
-    """Give every corner of a path a duration, as under constant acceleration: two tangents and a parabola."""
-    if corner_s == 0.0 or not path.parts.corner_s.size:
-        return path
-    time_s, input_mm = path.drive.time_s, path.drive.input_mm.copy()
-    for at_s, turn in zip(path.parts.corner_s, path.parts.turn_mm_s, strict=True):
-        near = slice(*np.searchsorted(time_s, (at_s - 0.5 * corner_s, at_s + 0.5 * corner_s)))
-        input_mm[near] += turn / (2.0 * corner_s) * (0.5 * corner_s - np.abs(time_s[near] - at_s)) ** 2
-    return replace(path, drive=replace(path.drive, input_mm=input_mm))
-
-
 def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Spread]:
     """Choose the duration of all corners that explains the frames best, and the spread of the fit over other durations.
 
@@ -94,10 +82,14 @@ def with_corners(motion: Motion, found: Fit) -> tuple[Motion, Fit, Spread]:
     widths = np.gradient(shares) if shares.size > 1 else np.ones(1)
     weights = widths * (squares / squares[best]) ** (-0.5 * data)
     at = np.array([[one.at.offset_s, one.at.rate, one.at.play_mm] for one in fits])
-    return *tried[shares[best]], Spread.over(at, weights, at[best])
+    turned, fitted = tried[shares[best]]
+    middle = np.average(shares, weights=weights)
+    u_corner_s = row_s * float(np.sqrt(np.average((shares - middle) ** 2, weights=weights)))
+    turned = replace(turned, path=replace(turned.path, u_corner_s=u_corner_s))
+    return turned, fitted, Spread.over(at, weights, at[best])
 
 
 def _turned(motion: Motion, found: Fit, corner_s: float) -> tuple[Motion, Fit]:
-    turned = replace(motion, path=rounded(motion.path, corner_s))
+    turned = replace(motion, path=motion.path.rounded(corner_s))
     near = fit(turned, found.at, free_play=True)
     return turned, min(near, most_likely(turned, found.at, NEAR_PLAYS), key=lambda one: one.squares)
