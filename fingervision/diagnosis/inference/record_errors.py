@@ -134,18 +134,19 @@ def settled_with_records(
     found : tuple of dict
         Draws from the posterior.
     """
-    whitener, has_log = problem.whitener, data.recorded.log is not None
-    is_uncertain = has_log or whitener.input_mm.any() or whitener.passing_mm.any()
-    again = list(simulated_records(data, rng)) if is_uncertain else []
-    if (data.turning is None and not has_log) or not explanation.names:
+    whitener, log, turning = problem.whitener, data.recorded.log, data.turning
+    is_seen = log is not None or whitener.input_mm.any() or whitener.passing_mm.any()
+    again = list(simulated_records(data, rng)) if is_seen or turning is not None else []
+    counted = again if is_seen else []
+    if (turning is None and log is None) or not explanation.names:
         best, found = settled(problem, explanation, rng)
-        return with_record_errors(problem, best, again), found
+        return with_record_errors(problem, best, counted), found
     alone = _with_picture_noise(data, problem, explanation, again)
     best, found = settled(alone, refit(alone, explanation), rng)
     # A residual above the assumed noise widens the intervals (Birge 1932).
     rows = max(1, problem.rows - best.free)
     best = replace(best, covariance=best.covariance * max(1.0, best.score / rows))
-    best = with_record_errors(alone, best, again, assumed_mm=_assumed(alone, rng))
+    best = with_record_errors(alone, best, counted, assumed_mm=_assumed(alone, rng))
     return problem.judged(best, best.values), found
 
 
