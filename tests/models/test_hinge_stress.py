@@ -14,8 +14,6 @@ from fingervision.models.stiffness_matrix import StiffnessMatrixGripper
 
 NOTCH = 0.02
 """Tolerance of Neuber's factor for a deep notch at t / R = 0.25, and of the frame's force, against finite elements."""
-SEGMENTS = 1e-3
-"""Tolerance of the frame with ten segments against the frame with forty."""
 
 
 def test_the_thinnest_section_carries_what_finite_elements_find(

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from fingervision.domain.errors import DeviceError, FingervisionError, LimitError
+from fingervision.domain.errors import DeviceError, FingervisionError
 from fingervision.storage.drive_csv import read_samples
 from fingervision.storage.recorded_video import frames_in
 from fingervision.testbed.bed import Bed
@@ -132,15 +132,6 @@ def test_a_stop_in_motion_stops_the_stage_while_it_is_asked(bed: Bed) -> None:
     assert bed.actuator.readings()[-1].value == pytest.approx(at_mm, abs=0.002)
     assert bed.actuator.alarm is None
     bed.actuator.move(at_mm + 0.02, 0.5)  # the next motion is accepted
-
-
-def test_beyond_the_limits_nothing_moves(bed: Bed) -> None:
-    before_mm = bed.actuator.readings()[-1].value
-    for to_mm, mm_s in ((8.1, 0.5), (-2.1, 0.5), (1.0, 1.01 * bed.actuator.limits.speed_mm_s)):
-        with pytest.raises(LimitError, match="nothing was moved"):
-            bed.actuator.move(to_mm, mm_s)
-    assert not bed.actuator.busy
-    assert bed.actuator.readings()[-1].value == pytest.approx(before_mm, abs=0.002)
 
 
 def test_an_unplugged_stage_is_a_sentence_and_works_when_it_is_back(
