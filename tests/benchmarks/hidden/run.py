@@ -1,10 +1,10 @@
-"""Benchmark of hidden effects: simulate tables, apply every method, and print a table of marks.
+"""Benchmark of hidden effects: simulate tables, diagnose them, and print a table of marks.
 
     python -m tests.benchmarks.hidden.run --tables 40 --jobs 2 --seed 1 --rows null,single_1
 
 All results are stored under --out by seed, row and number, so that a run may be stopped and continued. All rows are
 processed in turn. With --minutes M, no table is begun after that time; --minutes 0 prints the stored results; --again
-METHOD repeats a method. --scheduler tcp://HOST:PORT uses a Dask cluster whose workers were started at the top of the
+repeats the diagnoses. --scheduler tcp://HOST:PORT uses a Dask cluster whose workers were started at the top of the
 repository. Seeds below 1000 are for development, seeds from 1000 on for results.
 """
 
@@ -32,32 +32,31 @@ from tests.benchmarks.hidden.table_cache import JudgedTable, draw_table_of_row
 from tests.benchmarks.hidden.unforeseen import widened
 from tests.benchmarks.hidden.unseen_run import unseen_error_ratio
 
-METHODS = ("diagnose",)
+ANSWER = "diagnose.json"
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One table for one method."""
+    """One table."""
 
     row: str
     index: int
     seed: int
-    method: str
     out: Path
 
     @property
     def folder(self) -> Path:
-        """Folder of the table, the answers and the marks."""
+        """Folder of the table, the answer and the marks."""
         return self.out / f"seed{self.seed}" / self.row / f"{self.index:04d}"
 
     @property
     def kept(self) -> Path:
         """File of the marks."""
-        return self.folder / f"{self.method}_marks.json"
+        return self.folder / "diagnose_marks.json"
 
 
-def _ask(table: JudgedTable, method: str) -> Answer:
-    kept = table.folder / f"{method}.json"
+def _ask(table: JudgedTable) -> Answer:
+    kept = table.folder / ANSWER
     report = table.folder / "diagnosis" / "report.json"
     if kept.exists():
         held = json.loads(kept.read_text(encoding="utf-8"))
@@ -81,11 +80,11 @@ def marked(task: Task) -> dict[str, object]:
 
 
 def work(task: Task) -> dict[str, object]:
-    """Simulate a table, apply the method, and mark its answer; returns a dictionary that can be stored."""
+    """Simulate a table, diagnose it, and mark the answer; returns a dictionary that can be stored."""
     row, folder = ROWS[task.row], task.folder
     table = draw_table_of_row(row, task.seed, task.index, folder)
     hidden = frozenset(h.name for h in table.experiment.plant.hidden)
-    answer = _ask(table, task.method)
+    answer = _ask(table)
     given = mark(row, widened(table, answer, hidden), answer, hidden)
     result: dict[str, object] = {"mark": asdict(given), "verdict": answer.verdict, "seconds": answer.seconds}
     result |= {"sets": ["+".join(sorted(s)) for s in answer.sets], "hidden": "+".join(sorted(hidden))}
@@ -117,9 +116,9 @@ def guarded(task: Task) -> dict[str, object]:
         return {"fault": traceback.format_exc(limit=6)}
 
 
-def report_of(method: str, results: dict[str, list[dict[str, object]]]) -> list[str]:
-    """Printed table for one method."""
-    lines = [f"== {method}"]
+def report_of(results: dict[str, list[dict[str, object]]]) -> list[str]:
+    """Printed table."""
+    lines = list[str]()
     for name, found in results.items():
         marks = [Mark(**r["mark"]) for r in found if "mark" in r]  # type: ignore[arg-type]
         lines += row_lines(ROWS[name], marks)
@@ -150,33 +149,24 @@ def report_of(method: str, results: dict[str, list[dict[str, object]]]) -> list[
     return lines
 
 
-def _tasks(chosen: Namespace, rows: list[str], methods: list[str]) -> list[Task]:
-    """Tables by methods, without the kept answers of the method that is to run again."""
-    tasks = [
-        Task(row, index, chosen.seed, method, chosen.out.absolute())
-        for index in range(chosen.first, chosen.first + chosen.tables)
-        for row in rows
-        for method in methods
-    ]
-    for task in tasks:
-        if task.method == chosen.again:
-            (task.folder / f"{task.method}.json").unlink(missing_ok=True)
-            task.kept.unlink(missing_ok=True)
+def _tasks(chosen: Namespace) -> list[Task]:
+    """Tables, without their kept answers if they are to be diagnosed again."""
+    numbers = range(chosen.first, chosen.first + chosen.tables)
+    tasks = [Task(row, index, chosen.seed, chosen.out.absolute()) for index in numbers for row in chosen.rows]
+    for task in tasks if chosen.again else ():
+        (task.folder / ANSWER).unlink(missing_ok=True)
+        task.kept.unlink(missing_ok=True)
     return tasks
-
-
-def _batch(tasks: list[Task]) -> list[dict[str, object]]:
-    return [guarded(task) for task in tasks]
 
 
 def _tell(task: Task, result: dict[str, object], misses: Path | None) -> None:
     if "fault" in result:
-        print(f"{task.row} {task.index} {task.method}: {result['fault']}", flush=True)
+        print(f"{task.row} {task.index}: {result['fault']}", flush=True)
     missed = "mark" in result and not result["mark"]["right"]  # type: ignore[index]
     if missed:
         said, hidden = result["verdict"], result["hidden"]
         print(
-            f"   {task.method} missed {task.row} {task.index}: hidden {hidden or '-'}, said {said} {result['sets']}",
+            f"   missed {task.row} {task.index}: hidden {hidden or '-'}, said {said} {result['sets']}",
             flush=True,
         )
         if misses is not None:
@@ -191,32 +181,25 @@ def _tell(task: Task, result: dict[str, object], misses: Path | None) -> None:
     scheduler={"help": "Dask cluster, tcp://HOST:PORT; --out on a path that its workers see"},
     seed=1,
     rows=listed(ROWS),
-    methods=listed(METHODS),
     out=Path("results/hidden"),
-    again={"default": "", "help": "method whose kept answers are thrown away"},
+    again={"action": "store_true", "help": "diagnose tables with a kept answer again"},
     misses={"type": Path, "help": "folder that gets a copy of every table that diagnose missed"},
     minutes={"type": float, "default": np.inf, "help": "begin no table after so many"},
 )
 def main(chosen: Namespace) -> None:
     """Read the options, process the tables, and print the results."""
-    begun, rows, methods = time.perf_counter(), chosen.rows, chosen.methods
-    tasks = _tasks(chosen, rows, methods)
+    begun, tasks = time.perf_counter(), _tasks(chosen)
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    # All methods for one table run in one process, so that the table is simulated once.
-    results: dict[str, dict[str, list[dict[str, object]]]] = {m: {r: [] for r in rows} for m in methods}
-    batches = [tasks[i : i + len(methods)] for i in range(0, len(tasks), len(methods))]
-    known = [batch for batch in batches if all(task.kept.exists() for task in batch)]
-    for batch in known:
-        for task in batch:
-            results[task.method][task.row].append(marked(task))
-    asked = [batch for batch in batches if batch not in known and chosen.minutes > 0]
-    found = answers(_batch, asked, chosen.jobs, chosen.minutes, chosen.scheduler)
-    for done, (batch, told) in enumerate(found, 1):
-        for task, result in zip(batch, told, strict=True):
-            results[task.method][task.row].append(result)
-            _tell(task, result, chosen.misses)
+    known = [task for task in tasks if task.kept.exists()]
+    results: dict[str, list[dict[str, object]]] = {row: [] for row in chosen.rows}
+    for task in known:
+        results[task.row].append(marked(task))
+    asked = [task for task in tasks if task not in known and chosen.minutes > 0]
+    found = answers(guarded, asked, chosen.jobs, chosen.minutes, chosen.scheduler)
+    for done, (task, result) in enumerate(found, 1):
+        results[task.row].append(result)
+        _tell(task, result, chosen.misses)
         if done % 10 == 0:
             print(f"   {done} of {len(asked)} tables, {time.perf_counter() - begun:.0f} s", flush=True)
-    for method in methods:
-        print("\n".join(report_of(method, results[method])))
+    print("\n".join(report_of(results)))
     print(f"seed {chosen.seed}, {time.perf_counter() - begun:.0f} s")
