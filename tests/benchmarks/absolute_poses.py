@@ -10,6 +10,7 @@ perspective that the calibration knows. With `lossy` the pictures are JPEG of qu
 another level lies over a part of a moving body.
 """
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -29,6 +30,7 @@ from fingervision.measuring.scale import Scale
 from fingervision.storage.mechanism_toml import mechanism_from_tables
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings
 from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.scores import within
 from tests.diagnosis.lever_drawing import TABLES
 
 Array = NDArray[np.float64]
@@ -196,9 +198,7 @@ def main(given: Namespace) -> None:
     centroids = {name: centroid(name) for name in BOXES}
     for kind in given.kinds:
         rng = np.random.default_rng([given.seed, len(kind)])
-        scores: dict[str, list[float]] = {"x": [], "y": [], "angle": [], "hinge": []}
-        own: dict[str, list[float]] = {"x": [], "y": [], "angle": [], "hinge": []}
-        silent = 0
+        scores, own, silent = defaultdict[str, list[float]](list), defaultdict[str, list[float]](list), 0
         for case in range(given.cases):
             scale, s_true, bias = scale_of(kind, rng)
             dark = bool(rng.random() < 0.7)
@@ -241,7 +241,5 @@ def main(given: Namespace) -> None:
                 own["hinge"].append((pose.angle_mrad - turn) / pose.random[2, 2] ** 0.5)
         print(f"{kind}: {given.cases} cases, {silent} without a pose")
         for part, values in scores.items():
-            z, r = np.array(values), np.array(own[part])
-            print(f"  {part}: {100 * np.mean(np.abs(z) < 1.96):.1f} % of {z.size} within 1.96 u (RMS of error / u "
-                  f"{np.sqrt(np.mean(z**2)):.2f}, largest {np.abs(z).max():.1f}); by the frame's own part alone "
-                  f"{100 * np.mean(np.abs(r) < 1.96):.1f} %", flush=True)  # fmt: skip
+            print(f"  {part}: {within(values, 1.96)}, largest {np.abs(values).max():.1f}")
+            print(f"    by the frame's own part alone: {within(own[part], 1.96)}", flush=True)

@@ -2,9 +2,8 @@
 
     python -m tests.benchmarks.accuracy [--frames 200] [--seed 1] [--only NAME]
 
-Every class draws its frames at random: sub-pixel positions uniform, everything else as the class says. Columns: RMS,
-mean and largest error of `gap_px`; share of frames with a value; share of errors beyond 0.25 px; share of errors within
-one and within two of the stated `u_gap_px`, which must be 68 and 95 %.
+Every class draws its frames at random: sub-pixel positions uniform, everything else as the class says. `scores`
+explains the columns; within one and two of the stated `u_gap_px` must be 68 and 95 % of the errors.
 """
 
 import io
@@ -23,7 +22,7 @@ from fingervision.frames.video_file import VideoFile
 from fingervision.rendering import Camera, Light, Scene, SquareTip, render, truth, two_fingers
 from fingervision.vision.pipeline import Settings
 from tests.benchmarks.frame import Namespace, benchmark
-from tests.benchmarks.scores import BEYOND_PX, Scores, percent, rms
+from tests.benchmarks.scores import Scores, print_classes
 
 PX_PER_MM = 34.0
 BELOW_PX = 0.3 * PX_PER_MM
@@ -201,22 +200,7 @@ def scored(name: str, frames: int, seed: int) -> Scores:
     return scores
 
 
-def line(name: str, of: Scores, frames: int) -> str:
-    e, z = of.error, np.abs(of.error) / of.columns[1]
-    return (
-        f"{name:15s} {len(e):5d} {rms(e):8.4f} {e.mean():+8.4f} {np.abs(e).max():8.4f} {100 * len(e) / frames:6.1f} "
-        f"{percent(np.abs(e) > BEYOND_PX):6.1f} {np.median(of.columns[1]):8.4f} {percent(z < 1):6.1f} "
-        f"{percent(z < 2):6.1f} {1e3 * of.seconds / frames:6.2f} {of.refused}"
-    )
-
-
 @benchmark(frames=200, seed=1, only={"nargs": "*"})
 def main(options: Namespace) -> None:
-    print("class           frames   RMS px    mean px   max px  value% >.25%  median u  <1u %  <2u %  ms")
-    within = []
-    for name in options.only or [*SINGLE, "h264"]:
-        found = scored(name, options.frames, options.seed)
-        within.append(np.abs(found.error) / found.columns[1])
-        print(line(name, found, options.frames), flush=True)
-    z = np.concatenate(within)
-    print(f"all             {len(z):5d}  within one u {percent(z < 1):.1f} %, within two {percent(z < 2):.1f} %")
+    """Print the table."""
+    print_classes(options.only or [*SINGLE, "h264"], lambda name: scored(name, options.frames, options.seed))

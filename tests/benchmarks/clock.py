@@ -26,6 +26,7 @@ from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks.drawn_recordings import Drawn, draw
 from tests.benchmarks.frame import Namespace, benchmark, in_turn
+from tests.benchmarks.scores import within
 
 WIDEST_PX, FRAME_PX, BELOW_PX = 230.0, (360, 120), 10.2
 """Largest gap of a rendered recording, its frame, and where it is measured: small frames are measured fast,
@@ -142,10 +143,11 @@ def main(asked: Namespace) -> None:
             )
     for name, count in tally.items():
         print(f"{name}: {count}")
-    share = tally["within 2u"] / max(len(scores), 1)
-    print(f"answered: {len(scores)}, within 2u: {share:.3f}, RMS score {np.sqrt(np.mean(np.square(scores))):.2f}")
-    for name, off in plays.items():
-        within, rms = np.mean(np.abs(off) < 2.0), np.sqrt(np.mean(np.square(off)))
+    for name, off in {
+        "answered": scores,
+        "play of the clock": plays["clock"],
+        "play named": plays["diagnosis"],
+    }.items():
         if off:
-            print(f"play of the {name}: {len(off)}, within 2u: {within:.3f}, RMS score {rms:.2f}")
+            print(f"{name}: {within(off)}")
     print(f"seconds of processor time: median {np.median(seconds):.2f}, largest {max(seconds):.2f}")

@@ -5,8 +5,8 @@
 An edge that runs along a codec's blocks gets one error in all its rows. The recordings are drawn by code of their own
 (exact integrals of blurred bars, nothing of the product's renderer), coded and decoded, and four pictures of each are
 measured, far apart. A class is a codec with its bit rate and how far the fingers lean; motion, preset, blur, noise,
-contrast and scale are random. Columns: RMS and largest error of `gap_px`; median stated `u_gap_px`; share of errors
-within one and two of it (both parts together), which must be 68 and 95 %; pictures without a value.
+contrast and scale are random. `scores` explains the columns; within one and two u of both parts together must be 68 and
+95 % of the errors.
 """
 
 import io
@@ -26,7 +26,7 @@ from fingervision.domain.frame import Coding, Frame
 from fingervision.frames.video_file import VideoFile
 from fingervision.vision.pipeline import LINEAR_CAMERA, Settings
 from tests.benchmarks.frame import Namespace, benchmark
-from tests.benchmarks.scores import Scores, percent, rms
+from tests.benchmarks.scores import Scores, print_classes
 from tests.clips import opened_to_write
 
 Floats = NDArray[np.float64]
@@ -208,23 +208,7 @@ def scored(name: str, clips: int, seed: int) -> Scores:
     return scores
 
 
-def line(name: str, of: Scores) -> str:
-    if not of.found:
-        return f"{name:22s}     0 {of.refused}"
-    e, z = of.error, np.abs(of.error) / of.u
-    return (
-        f"{name:22s} {e.size:5d} {rms(e):8.4f} {np.abs(e).max():8.4f} {np.median(of.u):8.4f} {percent(z < 1):6.1f} "
-        f"{percent(z < 2):6.1f} {1e3 * of.seconds / e.size:6.2f} {of.refused}"
-    )
-
-
 @benchmark(clips=40, seed=1, only={"nargs": "*", "choices": list(CLASSES)})
 def main(options: Namespace) -> None:
-    print("class                  frames   RMS px   max px median u   <1u %  <2u %  ms")
-    within = []
-    for name in options.only or CLASSES:
-        found = scored(name, options.clips, options.seed)
-        within.append(np.abs(found.error) / found.u)
-        print(line(name, found), flush=True)
-    z = np.concatenate(within)
-    print(f"all                    {z.size:5d} within one u {percent(z < 1):.1f} %, within two {percent(z < 2):.1f} %")
+    """Print the table."""
+    print_classes(options.only or CLASSES, lambda name: scored(name, options.clips, options.seed))

@@ -13,7 +13,6 @@ frames are called damaged, and why.
 """
 
 import tempfile
-from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +28,7 @@ from fingervision.frames.source import open_source
 from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers
-from tests.benchmarks.frame import Namespace, benchmark, in_turn
+from tests.benchmarks.frame import Namespace, Tally, benchmark, in_turn
 from tests.clips import Codec, coded, h264
 
 RATE_HZ, FRAMES, SIZE_PX = 25.0, 75, (320, 240)
@@ -226,7 +225,7 @@ def wrong(found: list[Row], times_s: np.ndarray, gaps_px: np.ndarray) -> list[tu
 
 def measure_sound(folder: Path, kinds: list[str], films: int, seed: int, minutes: float) -> None:
     """Print how many frames of undamaged films are refused as damaged."""
-    totals: dict[str, list[int]] = defaultdict(lambda: [0] * 4)
+    tally = Tally("films", "frames", "ok", "called damaged")
     for number in in_turn(range(films), minutes):
         kind, motion = kinds[number % len(kinds)], MOTIONS[number // 2 % len(MOTIONS)]
         path = folder / kind
@@ -234,20 +233,16 @@ def measure_sound(folder: Path, kinds: list[str], films: int, seed: int, minutes
         results = measure_in_memory(open_source(str(path)), TASK).results
         bad = [each for each in results if each.outcome.status is Status.DAMAGED]
         measured = sum(each.outcome.status is Status.OK for each in results)
-        for total in (totals[motion], totals["all"]):
-            for place, count in enumerate((1, len(results), measured, len(bad))):
-                total[place] += count
+        tally.add([motion], {"films": 1, "frames": len(results), "ok": measured, "called damaged": len(bad)})
         for each in bad[:3]:
             print(f"{number} {kind} {motion}: frame {each.index}: {each.outcome.words}", flush=True)
-    print(f"{'motion':10} {'films':>6} {'frames':>7} {'ok':>7} {'called damaged':>15}")
-    for motion, (count, frames, measured, bad_frames) in sorted(totals.items(), key=lambda each: each[0] == "all"):
-        print(f"{motion:10} {count:6} {frames:7} {measured:7} {bad_frames:15}")
+    tally.show()
 
 
 def measure_damaged(folder: Path, kinds: list[str], chosen: Namespace) -> None:
     """Print what damaged files give."""
-    totals: dict[str, list[int]] = defaultdict(lambda: [0] * 6)
-    frames, originals, ran = film(GAPS_PX), {}, 0
+    tally = Tally("files", "refused", "rows", "ok", "wrong", "files with wrong")
+    frames, originals = film(GAPS_PX), {}
     for kind in kinds:
         path = folder / kind
         written(path, frames)
@@ -269,21 +264,17 @@ def measure_damaged(folder: Path, kinds: list[str], chosen: Namespace) -> None:
         except FingervisionError:
             is_refused = 1
         bad = wrong(found, times_s, gaps_px)
-        counts = (1, is_refused, len(found), sum(row.gap_px is not None for row in found), len(bad), bool(bad))
-        for name in (kind, f"({what})", "all"):
-            for place, count in enumerate(counts):
-                totals[name][place] += count
-        ran += 1
+        counts = {"files": 1, "refused": is_refused, "rows": len(found), "wrong": len(bad)}
+        counts |= {"ok": sum(row.gap_px is not None for row in found), "files with wrong": bool(bad)}
+        tally.add([kind, f"({what})"], counts)
         if bad and chosen.verbose:
             told = ", ".join(f"{k}: {error:+.3f} ({allowed:.3f})" for k, error, allowed in bad[:6])
             print(f"{number} {kind} {words}: {len(bad)} wrong of {len(found)}: {told}", flush=True)
         if bad and chosen.keep:
             Path("build").mkdir(exist_ok=True)
             Path("build", f"{number}-{kind}").write_bytes(changed)
-    print(f"{ran} of {chosen.files - chosen.first} files ran")
-    print(f"{'kind':12} {'files':>6} {'refused':>8} {'rows':>7} {'ok':>7} {'wrong':>6} {'files with wrong':>17}")
-    for name, total in sorted(totals.items(), key=lambda each: (each[0] == "all", each[0].startswith("("))):
-        print(f"{name:12} {total[0]:6} {total[1]:8} {total[2]:7} {total[3]:7} {total[4]:6} {total[5]:17}")
+    print(f"{tally.of['all']['files']} of {chosen.files - chosen.first} files ran")
+    tally.show()
 
 
 @benchmark(

@@ -38,6 +38,7 @@ from fingervision.models.triangulate import PlaneMesh, triangulate
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.frame import Namespace, benchmark, in_turn
+from tests.benchmarks.scores import within
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).parents[2]
@@ -274,9 +275,10 @@ class Judged:
         if not self.errors:
             return f"{self.name}: 0 of {self.wanted}"
         errors, u = np.abs(self.errors), np.array(self.u)
-        return (f"{self.name}: {errors.size} of {self.wanted}, {100.0 * np.mean(errors <= 2.0 * u):.1f} % within 2u, "
-                f"rms of error/u {np.sqrt(np.mean((errors / u) ** 2)):.2f}, largest {errors.max():.4f} {self.unit} "
-                f"(median u {np.median(u):.4f})")  # fmt: skip
+        return (
+            f"{self.name}: {within(errors / u)} (there may be {self.wanted}), largest {errors.max():.4f} {self.unit} "
+            f"(median u {np.median(u):.4f})"
+        )
 
     def __add__(self, other: "Judged") -> "Judged":
         return Judged(self.name, self.unit, self.wanted + other.wanted, self.errors + other.errors, self.u + other.u)

@@ -12,7 +12,6 @@ wrongly after obeying (must be 0), and dead ends (at most one in ten). Exit code
 import re
 import shlex
 import tempfile
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.tables.questions import OpenQuestionError, Reading
 from fingervision.tables.read import read_drive, read_measured_table
 from tests.benchmarks.foreign.drawn import CLASSES, Drawn, Values, drawn
-from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.frame import Namespace, Tally, benchmark
 
 ROUNDS = 6
 OUTCOMES = ("right", "wrong", "right after advice", "wrong after advice", "dead end")
@@ -131,7 +130,7 @@ def _fits(reading: Reading, table: Drawn) -> bool:
 )
 def main(given: Namespace) -> None:
     """Draw, obey, compare, print."""
-    counts: dict[str, Counter[str]] = {label: Counter() for label in CLASSES}
+    tally = Tally(*OUTCOMES)
     with tempfile.TemporaryDirectory() as top:
         for number, (label, table) in enumerate(drawn(given.seed, given.each)):
             if given.only and label != given.only:
@@ -140,13 +139,10 @@ def main(given: Namespace) -> None:
             folder.mkdir()
             tell: list[str] = []
             result = outcome(table, folder, tell)
-            counts[label][result] += 1
+            tally.add([label], [result])
             if given.show and result != "right":
                 print(f"{label} {number} {table.what} [{table.kind}]: {result}", *tell, sep="\n    ")
-    print(f"{'':20}" + "".join(f"{name:>20}" for name in OUTCOMES))
-    for label, of in counts.items():
-        print(f"{label:20}" + "".join(f"{of[name]:20}" for name in OUTCOMES))
-    total = sum(counts.values(), Counter())
-    print(f"{'all':20}" + "".join(f"{total[name]:20}" for name in OUTCOMES))
+    tally.show()
+    total = tally.of["all"]
     bad = total["wrong"] + total["wrong after advice"]
     raise SystemExit(bad > 0 or 10 * total["dead end"] > sum(total.values()))

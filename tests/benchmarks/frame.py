@@ -1,13 +1,15 @@
-"""What benchmarks share: options, draws in turn within a time, processes, and lines of a table."""
+"""What benchmarks share: options, draws in turn within a time, processes, time that work takes, and tables."""
 
 import argparse
 import resource
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
+from statistics import median
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -95,6 +97,43 @@ def answers(
 def told(what: str, figure: str, bar: str = "", met: bool | None = None) -> None:
     """Print a line of a table: what, how much, the bar, and whether it is met."""
     print(f"{what:58} {figure:>22}  {bar:22} {'' if met is None else 'met' if met else 'MISSED'}", flush=True)
+
+
+class Tally:
+    """Counts of what came out, for each kind of case and for all, as a table with a line for each kind.
+
+    Parameters
+    ----------
+    columns : str
+        Names of what is counted, in the order of the table.
+    """
+
+    def __init__(self, *columns: str) -> None:
+        self._columns = columns
+        self.of: defaultdict[str, Counter[str]] = defaultdict(Counter)
+
+    def add(self, kinds: Iterable[str], counts: Mapping[str, int] | Iterable[str]) -> None:
+        """Count a case of one kind or several: how often each thing came out, or names of things that did."""
+        for kind in (*kinds, "all"):
+            self.of[kind].update(counts)
+
+    def show(self) -> None:
+        """Print the table; what is of several kinds stands in brackets, below the others."""
+        wide = max(map(len, self.of), default=0) + 2
+        print(" " * wide + "".join(f"{name:>{len(name) + 4}}" for name in self._columns))
+        for kind, counts in sorted(self.of.items(), key=lambda each: (each[0] == "all", each[0].startswith("("))):
+            print(f"{kind:{wide}}" + "".join(f"{counts[name]:{len(name) + 4}}" for name in self._columns))
+
+
+def spent_s(work: Callable[[], object], times: int = 1) -> tuple[float, float]:
+    """Seconds of the clock and of the processor, ended processes included, that work takes: medians."""
+    found = []
+    for _ in range(times):
+        begun_s, used_s = time.perf_counter(), processor_s()
+        work()
+        found.append((time.perf_counter() - begun_s, processor_s() - used_s))
+    walls, processors = zip(*found, strict=True)
+    return median(walls), median(processors)
 
 
 def processor_s() -> float:

@@ -34,11 +34,14 @@ from fingervision.measuring.drawing_placement import GivenPoint
 from fingervision.models.mechanism_bodies import bodies_of, plate_poses
 from fingervision.models.place_answers import PlaceAnswers
 from tests.benchmarks.drawn_hinges import Hidden, frames_of, hidden, view_of
-from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.frame import Namespace, Tally, benchmark
+from tests.benchmarks.scores import within
 from tests.benchmarks.which_hinge import BODIES, Array, drawn
 
 PARTS = ("x_mm", "y_mm", "angle_mrad")
 VIEWS, KINDS = ("plain", "alike", "mirrored", "scaled"), ("nothing", "hinge", "link", "play")
+VERDICTS = ("named", "in the set", "wrong place", "unknown", "missed", "claims nothing", "claim where nothing is",
+            "too few rows", "refused")  # fmt: skip
 GIVEN_MM = ((-39.0, 0.0), (39.0, 0.0), (0.0, 2.57))
 
 
@@ -105,7 +108,7 @@ def main(given: Namespace) -> None:
     """Render, follow, diagnose, print."""
     answers = PlaceAnswers(drawn())
     names = tuple(f"{body}.{part}" for body in given.bodies for part in PARTS)
-    counts: dict[str, Counter[str]] = {}
+    tally = Tally(*VERDICTS, "poses off")
     offs: list[float] = []
     for number in range(given.recordings):
         began = time.process_time()
@@ -130,7 +133,7 @@ def main(given: Namespace) -> None:
         try:
             seen = list(tracker.poses(frames))
         except FingervisionError as error:
-            counts.setdefault(view_kind, Counter())["refused"] += 1
+            tally.add([view_kind], ["refused"])
             print(f"{view_kind} {100 * view.off:+.1f} %, {what.words}: refused: {error}", flush=True)
             continue
         rows, measured, floors = rows_of(seen, given.bodies)
@@ -143,18 +146,12 @@ def main(given: Namespace) -> None:
             found = PlaceSearch(prediction, measured, (slice(0, rows.size),), floors, timed=True).run(rng)
             (verdict, told, own), structure = verdict_of(what, found, view.off), found.structure
             offs += own
-        counts.setdefault(view_kind, Counter())[verdict] += 1
-        counts[view_kind]["poses off"] += wrong
+        tally.add([view_kind], Counter({verdict: 1, "poses off": wrong}))
         print(
             f"{view_kind} {100 * view.off:+.1f} %, {what.words}: {verdict} {' | '.join(told)} ({rows.size} of "
             f"{given.frames} frames, {wrong} poses off, structure {structure:.0f}, "
             f"{time.process_time() - began:.0f} s) {' / '.join(notes)}", flush=True,
         )  # fmt: skip
-    for kind, counted in counts.items():
-        print(f"{kind}: " + ", ".join(f"{name} {count}" for name, count in counted.items()))
+    tally.show()
     if offs:
-        z = np.array(offs)
-        print(
-            f"sizes within 1.96 u: {np.sum(np.abs(z) < 1.96)} of {z.size}, RMS of error / u "
-            f"{np.sqrt(np.mean(z**2)):.2f}"
-        )
+        print(f"sizes: {within(offs, 1.96)}")

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from fingervision.models.motion_in_time import gripper_motion
 from fingervision.models.parameter_sweep import parse_variation, sweep_answers
 from fingervision.models.reference_mesh import ElementSize, mesh_outline
 from fingervision.storage.gripper_toml import read_gripper
-from tests.benchmarks.frame import Namespace, benchmark, processor_s
+from tests.benchmarks.frame import Namespace, benchmark, spent_s
 
 GRIPPER = Path(__file__).parents[2] / "sample_frames" / "paper" / "gripper.toml"
 REPEATS = 3
@@ -31,12 +30,7 @@ def _command() -> None:
 
 
 def _row(what: str, run: Callable[[], object]) -> None:
-    seconds = []
-    for _ in range(REPEATS):
-        began = time.perf_counter(), processor_s()
-        run()
-        seconds.append((time.perf_counter() - began[0], processor_s() - began[1]))
-    clock, processor = np.median(seconds, axis=0)
+    clock, processor = spent_s(run, REPEATS)
     print(f"{clock:8.3f} s  {processor:8.3f} s  {what}", flush=True)
 
 

@@ -24,7 +24,7 @@ from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.model_toml import read_model
 from fingervision.storage.recipe_toml import read_recipe, read_steps
 from fingervision.storage.toml_section import Section
-from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.frame import Namespace, Tally, benchmark
 
 MODEL = """schema = 1
 base = "simulation.csv"
@@ -147,29 +147,20 @@ def main(chosen: Namespace) -> None:
             "board": (".toml", BOARD, read_board),
             "calibration": (".json", calibration, read_calibration),
         }
-        print(f"{'kind':12} {'files':>6} {'read':>6} {'refused':>8} {'faults':>7} {'no numbers':>11}")
+        tally, seen = Tally("files", "read", "refused", "faults", "no numbers"), Counter[str]()
         for kind, (suffix, text, read) in kinds.items():
-            counts: Counter[str] = Counter()
-            seen: Counter[str] = Counter()
             for _ in range(chosen.files // len(kinds)):
                 path = folder / f"mutated{suffix}"
                 path.write_text(mutated(text, rng), encoding="utf-8")
-                counts["files"] += 1
                 try:
-                    found = read(path)
+                    came = ["read"] if is_sound(read(path)) else ["read", "no numbers"]
                 except FingervisionError:
-                    counts["refused"] += 1
+                    came = ["refused"]
                 except Exception as error:
-                    counts["faults"] += 1
-                    seen[
-                        f"{type(error).__name__}: {error} at {traceback.extract_tb(error.__traceback__)[-1]}"[:200]
-                    ] += 1
-                else:
-                    counts["read"] += 1
-                    counts["no numbers"] += not is_sound(found)
-            print(
-                f"{kind:12} {counts['files']:6} {counts['read']:6} {counts['refused']:8} {counts['faults']:7} "
-                f"{counts['no numbers']:11}"
-            )
-            for words, times in seen.most_common(8):
-                print(f"    {times} x {words}")
+                    came = ["faults"]
+                    place = traceback.extract_tb(error.__traceback__)[-1]
+                    seen[f"{kind}: {type(error).__name__}: {error} at {place}"[:200]] += 1
+                tally.add([kind], ["files", *came])
+    tally.show()
+    for words, times in seen.most_common():
+        print(f"    {times} x {words}")

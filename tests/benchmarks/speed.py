@@ -1,21 +1,20 @@
-"""Speed, memory and start-up of `measure`.
+"""Speed and memory of `measure`.
 
-    python -m tests.benchmarks.speed [--frames 1500] [--runs 5] [--only rate|kinds|memory|start] [--sizes 1920x1080]
+    python -m tests.benchmarks.speed [--frames 1500] [--runs 5] [--only rate|kinds|memory] [--sizes 1920x1080]
         [--coders ffv1.mkv] [--lengths 60 2000]
 
 Rate: frames per second of decoding alone and of measuring, in turn on the same file, medians; and milliseconds of one
 core for everything after decoding, beside the same steps written plainly with OpenCV and with scikit-image. Kinds:
 the same milliseconds for a picture of 3840x2160 and for each kind of picture without two fingers, which is refused.
 Memory: peak of `measure` at 60 and 2000 frames (`--lengths`), for four codecs (`--coders`) and three sizes of the
-picture (`--sizes`). Start-up: `fingervision --help`. Every figure is that of the machine it runs on; the clip of the
-rates is 640x480, H.264 of about 5 Mbit/s.
+picture (`--sizes`). Every figure is that of the machine it runs on; the clip of the rates is 640x480, H.264 of about 5
+Mbit/s. `first_run` times the start of the program.
 """
 
 import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
@@ -38,7 +37,7 @@ from fingervision.vision.pipeline import Settings, measure_frame
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.benchmarks.damaged_files import KINDS
-from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.frame import Namespace, benchmark, spent_s
 from tests.benchmarks.scenes.empty import EMPTY
 from tests.clips import coded, h264, write_clip
 
@@ -73,12 +72,6 @@ def decode(path: Path) -> int:
 def run(path: Path, out: Path, direction: Direction | None) -> int:
     task = Task(BareScale(PX_PER_MM), direction=direction)
     return measure(open_source(str(path)), task, out).series.frames
-
-
-def seconds(work: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
 
 
 def plain_opencv(pixels: Pixels) -> float | None:
@@ -125,9 +118,9 @@ def rate(folder: Path, levels: list[Pixels], frames: int, runs: int) -> None:
     alone: list[float] = []
     by_tips: dict[str, list[float]] = {"measure --tips up": [], "measure --tips auto": []}
     for _ in range(runs):
-        alone.append(frames / seconds(lambda: decode(path)))
+        alone.append(frames / spent_s(lambda: decode(path))[0])
         for name, direction in (("measure --tips up", Direction.UP), ("measure --tips auto", None)):
-            by_tips[name].append(frames / seconds(lambda way=direction: run(path, folder / "out", way)))
+            by_tips[name].append(frames / spent_s(lambda way=direction: run(path, folder / "out", way))[0])
     reference = statistics.median(alone)
     print(f"{'decoding alone':34}{reference:10.0f}{1.0:13.2f}")
     for name, rates in by_tips.items():
@@ -145,13 +138,8 @@ def rate(folder: Path, levels: list[Pixels], frames: int, runs: int) -> None:
         decoded = [picture.to_ndarray()[:480].copy() for picture in islice(container.decode(video=0), 100)]
     print(f"\n{'After decoding, ms of one core':34}{'ms/frame':>10}")
     for name, step in steps.items():
-        spent = []
-        for _ in range(runs):
-            start = time.process_time()
-            for pixels in decoded:
-                step(pixels)
-            spent.append(1e3 * (time.process_time() - start) / len(decoded))
-        print(f"{name:34}{statistics.median(spent):10.2f}")
+        used_s = spent_s(lambda step=step: [step(pixels) for pixels in decoded], runs)[1]
+        print(f"{name:34}{1e3 * used_s / len(decoded):10.2f}")
 
 
 def kinds(runs: int) -> None:
@@ -162,13 +150,11 @@ def kinds(runs: int) -> None:
     shown += [(f"refused: {name}", draw(rng).picture, BELOW_PX) for name, draw in EMPTY.items()]
     print(f"\n{'After decoding, ms of one core':34}{'ms/frame':>10}   what came out")
     for name, pixels, below_px in shown:
-        spent = []
-        for _ in range(runs):
-            start = time.process_time()
-            outcome = measure_frame(Frame(pixels, 0), Settings(below_px))
-            spent.append(1e3 * (time.process_time() - start))
+        shot = Frame(pixels, 0), Settings(below_px)
+        used_s = spent_s(lambda shot=shot: measure_frame(*shot), runs)[1]
+        outcome = measure_frame(*shot)
         words = outcome.status.value if isinstance(outcome, NoGap) else f"{outcome.gap_px:.2f} px"
-        print(f"{name:34}{min(spent):10.2f}   {words}", flush=True)
+        print(f"{name:34}{1e3 * used_s:10.2f}   {words}", flush=True)
 
 
 def peak_mb(path: Path, out: Path) -> float:
@@ -225,16 +211,10 @@ def memory(folder: Path, sizes: list[str], coders: list[str], lengths: list[int]
             print(f"{f'{size}, {kind}':46}{peaks[0]:7.0f}{peaks[1]:7.0f}{peaks[1] / peaks[0]:7.2f}", flush=True)
 
 
-def start_up(runs: int) -> None:
-    command = [sys.executable, "-m", "fingervision", "--help"]
-    spent = [seconds(lambda: subprocess.run(command, capture_output=True, check=True)) for _ in range(runs)]
-    print(f"\n{'Start-up, fingervision --help':34}{statistics.median(spent):10.2f} s")
-
-
 @benchmark(
     frames=1500,
     runs=5,
-    only={"choices": ["rate", "kinds", "memory", "start"]},
+    only={"choices": ["rate", "kinds", "memory"]},
     sizes={"nargs": "+", "default": SIZES},
     coders={"nargs": "+", "default": CODERS, "choices": CODERS},
     lengths={"nargs": 2, "type": int, "default": LENGTHS},
@@ -246,7 +226,5 @@ def main(asked: Namespace) -> None:
             rate(folder, levels, asked.frames, asked.runs)
         if asked.only in (None, "kinds"):
             kinds(asked.runs)
-        if asked.only in (None, "start"):
-            start_up(asked.runs)
         if asked.only in (None, "memory"):
             memory(folder, asked.sizes, asked.coders, asked.lengths)

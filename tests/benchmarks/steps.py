@@ -5,7 +5,6 @@
 Error: share of pixels that the step then calls dark or light wrongly, against the picture without noise.
 """
 
-import time
 from collections.abc import Callable
 
 import cv2
@@ -18,7 +17,7 @@ from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.binarise import binarise
 from fingervision.vision.grey import denoise
 from fingervision.vision.outlines import find_outlines
-from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.frame import Namespace, benchmark, spent_s
 
 DENOISE: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "none": lambda a: a,
@@ -51,10 +50,8 @@ def main(options: Namespace) -> None:
     print(f"{'step':34s} {'ms':>8s} {'wrong pixels':>13s}")
     for candidates in (DENOISE, SPLIT, OUTLINE):
         for name, step in candidates.items():
-            step(pairs[0][0])
-            start = time.perf_counter()
             answers = [step(noisy) for noisy, _ in pairs]
-            spent = 1e3 * (time.perf_counter() - start) / len(pairs)
+            spent = 1e3 * spent_s(lambda step=step: [step(noisy) for noisy, _ in pairs])[0] / len(pairs)
             if candidates is OUTLINE:
                 print(f"{name:34s} {spent:8.3f}")
                 continue

@@ -9,7 +9,6 @@ frames called damaged (must be 0), clocks that are not determined, and verdicts;
 """
 
 import tempfile
-from collections import Counter, defaultdict
 from fractions import Fraction
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 import fingervision as fv
 from fingervision.domain.errors import FingervisionError
 from fingervision.rendering import Camera, render, two_fingers
-from tests.benchmarks.frame import Namespace, benchmark, in_turn
+from tests.benchmarks.frame import Namespace, Tally, benchmark, in_turn
 
 Values = NDArray[np.float64]
 PX_PER_MM, FRAME_PX, BELOW_TIP_MM, DURATION_S = 30.0, (320, 96), 0.3, 9.0
@@ -126,7 +125,7 @@ def examined(folder: Path, kind: str, rng: Generator) -> tuple[int, int, str, st
 )
 def main(chosen: Namespace) -> None:
     """Print the table."""
-    totals: dict[str, Counter[str]] = defaultdict(Counter)
+    tally = Tally("recordings", "frames", "damaged", *VERDICTS)
     with tempfile.TemporaryDirectory() as folder:
         for number in in_turn(range(chosen.first, chosen.recordings), chosen.minutes):
             kind = KINDS[number % len(KINDS)]
@@ -138,10 +137,7 @@ def main(chosen: Namespace) -> None:
                 )
             except FingervisionError as error:
                 frames, damaged, verdict, words = 0, 0, "error", str(error)
-            for name in (kind, "all"):
-                totals[name].update({"recordings": 1, "frames": frames, "damaged": damaged, verdict: 1})
+            tally.add([kind], {"recordings": 1, "frames": frames, "damaged": damaged, verdict: 1})
             if chosen.verbose:
                 print(f"{number} {kind}: {damaged} of {frames} damaged; {verdict}; {words}", flush=True)
-    print(f"{'kind':16}" + "".join(f"{name:>11}" for name in ("recordings", "frames", "damaged", *VERDICTS)))
-    for kind, of in sorted(totals.items(), key=lambda each: each[0] == "all"):
-        print(f"{kind:16}" + "".join(f"{of[name]:11}" for name in ("recordings", "frames", "damaged", *VERDICTS)))
+    tally.show()

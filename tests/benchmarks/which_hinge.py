@@ -30,7 +30,8 @@ from fingervision.models.plane_shapes import Polygon
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.triangulate import triangulate
 from fingervision.storage.gripper_toml import read_gripper
-from tests.benchmarks.frame import Namespace, benchmark
+from tests.benchmarks.frame import Namespace, Tally, benchmark
+from tests.benchmarks.scores import within
 
 Array = NDArray[np.float64]
 
@@ -310,7 +311,7 @@ def slopes_of_drawn() -> dict[str, float]:
 
 def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng: np.random.Generator) -> None:
     """Print results for tables with two changes; a named place is wrong if it contains neither change."""
-    counts: dict[str, int] = {"one of them, or both in a set": 0, "wrong place": 0, "unknown": 0, "nothing": 0}
+    tally = Tally("one of them, or both in a set", "wrong place", "unknown", "nothing")
     for _ in range(tables):
         first, second = (things[k] for k in rng.choice(np.arange(1, len(things)), 2, replace=False))
         if first.slip is not None and second.slip is not None:
@@ -328,10 +329,10 @@ def two_causes(things: Sequence[Hidden], answers: PlaceAnswers, tables: int, rng
             said = "nothing"
         else:
             said = "one of them, or both in a set" if true & set(keys) or pairs else "wrong place"
-        counts[said] += 1
+        tally.add(["two causes"], [said])
         if said in ("wrong place", "nothing"):
             print(f"  {first.words} and {second.words}: {said} {' | '.join(dict.fromkeys(keys))}", flush=True)
-    print("two causes: " + ", ".join(f"{name} {count}" for name, count in counts.items()))
+    tally.show()
 
 
 @benchmark(tables=60, seed=1, two={"type": int, "default": 0, "help": "tables with two things hidden"}, verbose=False)
@@ -341,7 +342,7 @@ def main(given: Namespace) -> None:
     answers = PlaceAnswers(drawn())
     things = hidden_things(given.seed)
     print(f"{len(things)} hidden things by finite elements: {time.perf_counter() - began:.0f} s")
-    counts: dict[str, dict[str, int]] = {}
+    tally = Tally("named", "in the set", "wrong", "nothing")
     offs: dict[str, list[float]] = {}
     sizes: dict[str, list[int]] = {"gap": [], "bodies": []}
     rng = np.random.default_rng(given.seed + 1000)
@@ -353,8 +354,7 @@ def main(given: Namespace) -> None:
         if off is not None:
             offs.setdefault(thing.effect, []).append(off)
         kind = thing.effect or "nothing"
-        own = counts.setdefault(kind, {"named": 0, "in the set": 0, "wrong": 0, "nothing": 0})
-        own[verdict] += 1
+        tally.add([kind], [verdict])
         if thing.effect:
             other, plain, _, _ = judged(thing, answers, gap_alone(table))
             if verdict in ("named", "in the set") and other in ("named", "in the set"):
@@ -362,19 +362,17 @@ def main(given: Namespace) -> None:
                 sizes["bodies"].append(size)
         if given.verbose or verdict == "wrong" or (verdict == "nothing") == bool(thing.effect):
             print(f"  {thing.words}: {verdict} {words}", flush=True)
-    two_causes(things, answers, given.two, rng)
-    for kind, own in counts.items():
-        print(f"{kind}: " + ", ".join(f"{name} {count}" for name, count in own.items()))
-    planted = sum(sum(own.values()) for kind, own in counts.items() if kind != "nothing")
-    found = sum(own["named"] + own["in the set"] for kind, own in counts.items() if kind != "nothing")
-    wrong = sum(own["wrong"] for kind, own in counts.items() if kind != "nothing")
+    if given.two:
+        two_causes(things, answers, given.two, rng)
+    tally.show()
     for effect, values in offs.items():
-        inside = 100.0 * np.mean(np.abs(values) < 1.96)
-        spread = np.sqrt(np.mean(np.square(values)))
-        print(f"{effect}: size within 1.96 u in {inside:.0f} % of {len(values)}, RMS of error / u {spread:.2f}")
-    print(f"{given.tables} tables: {found} of {planted} at the right place or in the set, {wrong} wrong")
-    null = counts.get("nothing", {"nothing": 0})
-    print(f"claims where nothing is hidden: {sum(null.values()) - null['nothing']} of {sum(null.values())}")
+        print(f"{effect}: size {within(values, 1.96)}")
+    null = tally.of["nothing"]
+    planted = tally.of["all"] - null
+    right = planted["named"] + planted["in the set"]
+    print(f"{given.tables} tables: {right} of {planted.total()} at the right place or in the set, "
+          f"{planted['wrong']} wrong")  # fmt: skip
+    print(f"claims where nothing is hidden: {null.total() - null['nothing']} of {null.total()}")
     if sizes["gap"]:
         print(
             f"places in the answer: tips alone {np.mean(sizes['gap']):.1f}, with bodies {np.mean(sizes['bodies']):.1f}"
