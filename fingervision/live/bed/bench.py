@@ -76,7 +76,6 @@ class Bench:
         self.doing, self.position_mm = "", 0.0
         self.force_n: float | None = None
         self.progress: tuple[float, float] | None = None
-        self.newest_run: Path | None = None
         self._frames: Queue[Received | str] = Queue(FRAMES_WAITING)
         self._waiting: deque[tuple[Look, Frame]] = deque()
         self._asked: Queue[Task] = Queue(1)
@@ -228,7 +227,6 @@ class Bench:
         self._run += 1
         first_run = self._run
         self._controls = Controls()
-        self.newest_run = out
 
         def on_row(row: SampleRow, picture: Frame) -> None:
             number, *rest = row.run.split()

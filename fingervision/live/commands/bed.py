@@ -79,7 +79,6 @@ def section(view: View) -> dict[str, Any]:
             "force_n": bench.force_n,
             "doing": bench.doing,
             "progress": bench.progress,
-            "newest_run": None if bench.newest_run is None else str(bench.newest_run),
         }
     }
 
