@@ -13,7 +13,7 @@ from fingervision.diagnosis.inference.position_map import PositionMap
 from fingervision.diagnosis.inference.random_effect import DRAWING, FORM, GAINS, MAP, PATH, RunGains
 from fingervision.diagnosis.inference.uncertain_dimensions import BENT, DrawingRefit, estimated, tangent, with_moved
 from fingervision.diagnosis.input.driven_model import with_dynamics
-from fingervision.diagnosis.input.record_nuisances import TurningErrors, clock_columns
+from fingervision.diagnosis.input.record_nuisances import FREEDOM, TurningErrors, clock_columns
 from fingervision.diagnosis.noise.channel_noises import channel_noises, noises_of_repeats
 from fingervision.diagnosis.noise.noise_model import Noise, gate, without_input
 from fingervision.diagnosis.noise.replicates import PureError, pure_error, resolution
@@ -181,12 +181,24 @@ class Observations:
 
     def path_errors_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Change of the prediction per standard uncertainty of reversals, turning points and clock; shape (m, k)."""
-        parts = [clock_columns(self.chain, self.table.clock.u_s, values)]
+        parts = [self._clock_columns_mm(values)]
         if self.turning is not None:
             parts.append(self.turning.columns_mm(self.chain, values))
         if self.turns.random:
             parts.append(self.turn_columns_mm(values) * self.turns.sigmas)
         return np.hstack(parts)
+
+    def _clock_columns_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
+        """Change of the prediction per standard deviation of the clock offset's prior; shape (m, 1), or (m, 0).
+
+        Beside a reversal, the rows alone do not show the slope of the path. A play that is taken up within a frame, in
+        a motion at one speed, differs from an offset in these rows only.
+        """
+        u_s = self.table.clock.u_s
+        if self.recorded.log is None or u_s == 0.0:
+            return clock_columns(self.chain, u_s, values)
+        after, before = (self.later(way * u_s).chain.stacked(values) for way in (1.0, -1.0))
+        return np.asarray(0.5 * FREEDOM * (after - before))[:, None]
 
     def form_errors_mm(self, values: Mapping[str, Mapping[str, float]]) -> Array:
         """Change of the prediction per standard deviation of each error of an inexact formula; shape (m, k)."""

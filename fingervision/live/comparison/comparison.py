@@ -17,6 +17,7 @@ from fingervision.domain.effect import Array, History
 from fingervision.live.background import BackgroundCommand
 from fingervision.live.view import View
 from fingervision.models.corrected import CorrectedModel
+from fingervision.storage.drive_csv import DRIVE_LOG
 from fingervision.storage.gaps_csv import DRIVE_COLUMNS, GapRow, GapsCsv
 from fingervision.storage.out_folder import out_folder
 from fingervision.storage.summary_json import GAPS, SUMMARY
@@ -136,8 +137,10 @@ class VerdictSeeker:
         with out_folder(folder):
             with GapsCsv(table, DRIVE_COLUMNS) as written:
                 written.add([replace(row, run=row.run or "1") for row in rows])
-            if whole is not None:  # the summary of a recording says how sure its clock is
-                copyfile(whole.parent / SUMMARY, folder / SUMMARY)
+            if whole is not None:  # the clock of a recording, and its log, belong to its rows
+                for name in (SUMMARY, DRIVE_LOG):
+                    if (whole.parent / name).is_file():
+                        copyfile(whole.parent / name, folder / name)
         arguments = ("diagnose", str(table), "--model", str(self._model), "--kind", self._kind, "--out", str(folder))
         command = BackgroundCommand(*arguments)
         code, complaint = command.ended(self._ending)
