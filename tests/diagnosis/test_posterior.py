@@ -175,16 +175,19 @@ def test_a_play_seen_at_one_reversal_does_not_depend_on_the_offset_that_the_cloc
     assert abs(width.value - 0.03) < 2.0 * width.u < 0.001
 
 
-def test_a_run_of_one_row_beside_a_clock_is_no_obstacle():
+@pytest.mark.parametrize("has_log", [True, False])
+def test_a_run_of_one_row_beside_a_clock_is_no_obstacle(has_log):
     time_s = np.arange(0.0, 8.0, 0.04)
     stands_mm = np.interp(time_s, [0.0, 4.0, 8.0], [0.0, 1.2, 0.0])
     gap_mm = 1.2 + 7.72 * play(stands_mm, 0.05, 0.3) + np.random.default_rng(4).normal(0.0, 1e-3, time_s.size)
     columns = {"time_s": time_s.tolist(), "input_mm": stands_mm.tolist(), "gap_mm": gap_mm.tolist()}
-    table = measured_from_columns(columns | {"run": ["there and back"] * (time_s.size - 1) + ["again"]})
-    table = replace(table, clock=FoundClock(1e-3))
+    runs = ["there and back"] * (time_s.size - 1) + ["again"]
+    log = DriveHistory(time_s, stands_mm, tuple(runs)) if has_log else None
+    table = replace(measured_from_columns(columns | {"run": runs}), clock=FoundClock(1e-3), log=log)
     found = fv.diagnose(table, {"input_mm": [-0.5, 1.6], "gap_mm": [-2.66, 13.552]}).report
     assert [effect.name for effect in found.effects] == ["backlash"]
     assert abs(found.effects[0].parameters["play_mm"].value - 0.05) < 2e-3
+    assert any("drive_log.csv" in note for note in found.notes) != has_log
 
 
 @pytest.mark.parametrize(

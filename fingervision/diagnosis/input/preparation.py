@@ -205,10 +205,17 @@ def _notes_on_input(table: MeasuredTable, recorded: RecordedInput) -> tuple[str,
 def _notes_on_clock(table: MeasuredTable) -> tuple[str, ...]:
     if table.clock.u_s <= 0.0:
         return ()
-    return (
+    said = (
         f"the clocks of input and pictures were synchronised by this motion itself (U = {2.0 * table.clock.u_s:.2g} s "
         "over the frames, k = 2): a constant lag is part of this offset, so that a lag is named only if it exceeds "
-        "the offset's uncertainty.",
+        "the offset's uncertainty."
+    )
+    if table.log is not None:
+        return (said,)
+    return (
+        said,
+        "the drive's log is not beside this table (drive_log.csv), or is not that of its inputs: a play and its "
+        "uncertainty lack what happened between the frames; measure again with --drive.",
     )
 
 
