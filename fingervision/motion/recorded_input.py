@@ -109,7 +109,8 @@ class RecordedInput:
     commanded : bool
         Whether the record is a command that keeps its value until it jumps.
     stamps_mm : ndarray of float, shape (n,), or None
-        Effect on the gap of the rounding of the frames' times, independent from row to row; None if there is none.
+        Effect on the gap of the rounding of the frames' times, and of a log's own errors, independent from row to row;
+        None if there is neither.
     log : LogPath or None
         Path between the rows of the log from which the input was read; None without a log of a motion.
     """
