@@ -5,11 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array, Flags, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import Model
 from fingervision.motion.input_path import log_at, mostly_at_rest, recorded
-from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
+from fingervision.motion.local_polynomial_smoothing import LINES, SmoothedRecord
 from fingervision.motion.log_path import LogPath
 from fingervision.motion.time_stamps import input_error_of_stamps
 
@@ -167,7 +168,7 @@ class RecordedInput:
         slope = np.abs(ahead - behind) / (2.0 * reach)
         stamps_mm = slope * input_error_of_stamps(smooth, time_s, runs, table.stamp_s)[rows] if table.stamp_s else None
         if table.log is not None and not is_motion:
-            log = LogPath.of(table.log).rounded(table.clock.corner_s)
+            log = LogPath.of(_during(table.log, time_s)).rounded(table.clock.corner_s)
             return cls.logged(table, replace(log, u_corner_s=table.clock.u_corner_s).thinned(), slope, stamps_mm)
         if exact:
             kept = cls.exact(table, is_motion=is_motion)
@@ -255,6 +256,14 @@ def scatter_in_holds(history: History, residual_mm: Array) -> float:
     total = sum(float(np.sum((values - values.mean()) ** 2)) for values in settled)
     degrees = sum(values.size - 1 for values in settled)
     return float(np.sqrt(total / degrees)) if degrees else np.inf
+
+
+def _during(log: DriveHistory, time_s: Array) -> DriveHistory:
+    """Rows of a log during a table, and as many before and after it as the widest window of the smoothing has."""
+    first, last = np.searchsorted(log.time_s, [time_s.min(), time_s.max()])
+    rows = slice(max(int(first) - LINES[0], 0), int(last) + LINES[0])
+    run = None if log.run is None else log.run[rows]
+    return DriveHistory(log.time_s[rows], log.input_mm[rows], run)
 
 
 def _within(input_mm: Array, runs: tuple[slice, ...], samples: int, reach_mm: float) -> Flags:
