@@ -288,7 +288,7 @@ def _print_result(measured: "Measured") -> None:
     for name, gauge in measured.summary.get("gauges", {}).items():
         click.echo(gauge_sentence(name, gauge))
     folder = measured.folder
-    files = [folder.gaps, folder.gauges, folder.summary, folder.figure, folder.overlay, folder.steps]
+    files = [folder.gaps, folder.gauges, folder.drive_log, folder.summary, folder.figure, folder.overlay, folder.steps]
     click.echo("Written: " + ", ".join(str(file) for file in files if file.exists()))
 
 
