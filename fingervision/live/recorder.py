@@ -66,7 +66,7 @@ def minutes_left(folder: Path, seconds: float) -> float | None:
 FRAMES_WAITING = 250
 # With more waiting frames than this number, the preview is slowed down.
 FRAMES_UNTIL_HURRY = 12
-# Longest time that the disk may take for the waiting frames after the recording is stopped.
+# Longest time without a frame that is written or measured, after the recording is stopped.
 PATIENCE_S = 30.0
 DISK_EVERY_S = 1.0
 # A thread that writes is limited by the processor if it used or awaited one during at least this share of the time. If
@@ -109,10 +109,6 @@ class Recorder:
         """Queue a frame, or an event (its name and words)."""
         if self.failure:
             return
-        if not self.in_a_hurry:
-            self._since = None
-        elif self._since is None:
-            self._since = (monotonic(), self._worked_s, of_process_s())
         try:
             self._waiting.put_nowait(what)
         except Full:
@@ -141,8 +137,12 @@ class Recorder:
             raise OutputError(self.failure)
 
     def join(self) -> None:
-        """Wait until everything is written that was recorded before the end."""
-        self._thread.join(PATIENCE_S)
+        """Wait until everything is written that was recorded before the end, and measured, as long as it goes on."""
+        done: tuple[int, int] | None = None
+        while self._thread.is_alive() and done != (done := (self.run.frames, self.run.measured)):
+            self._thread.join(PATIENCE_S)
+        if self._thread.is_alive():
+            self.fail(self._too_slow())
 
     def _too_slow(self) -> str:
         """State whether the disk or the processor was the bottleneck since frames have had to wait."""
@@ -167,6 +167,14 @@ class Recorder:
             f"The folder {self.run.path} is gone (its disk was removed, or it was deleted), so recording ended: put "
             "the disk back, or record to another folder."
         )
+
+    def _note_the_hurry(self) -> None:
+        """Note what this thread and the process have used since frames wait; without a hurry nothing is read."""
+        if not self.in_a_hurry:
+            self._since = None
+            return
+        self._worked_s = of_this_thread_s()
+        self._since = self._since or (monotonic(), self._worked_s, of_process_s())
 
     def _look_at_the_disk(self) -> None:
         """Check whether the folder was deleted, which writing does not report, and how long the disk space suffices."""
@@ -201,5 +209,5 @@ class Recorder:
                 self.run.add(what)
             else:
                 self.run.event(*what)
-            self._worked_s = of_this_thread_s()
+            self._note_the_hurry()
             self._look_at_the_disk()

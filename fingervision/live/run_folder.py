@@ -92,6 +92,11 @@ class RunFolder:
         return self._table.camera
 
     @property
+    def measured(self) -> int:
+        """Number of frames whose rows are in the table."""
+        return self._table.measured
+
+    @property
     def is_there(self) -> bool:
         """Whether the written files still exist; the operating system would continue to write to deleted files."""
         return (self.path / EVENTS).exists()

@@ -30,6 +30,7 @@ from scipy.special import ndtr
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import FingerEdge, GapMeasurement, NoGap
 from fingervision.domain.status import Status
+from fingervision.measuring.finger_motion import JUMP_U, Place, jumps, place
 from fingervision.vision.grey import to_grey
 
 Outcome = GapMeasurement | NoGap | LostFrame
@@ -39,8 +40,6 @@ Floats = NDArray[np.float64]
 # Number of successive frames with a gap that may all be unlike one another: more of them are no faults, but fingers
 # that cannot be compared. Number of frames, with those without a gap, that may wait for one that confirms or refutes.
 MOST_UNLIKE, MOST_WAITING = 4, 12
-# Coverage factor and least size (pixels) of a jump, in the position of an edge or a tip.
-JUMP_U, LEAST_JUMP_PX = 3.0, 0.05
 # Height of the bands of rows in which the outlines are compared; number of bands from the measuring point towards the
 # root, and beyond the tip; and change of the share of finger-like pixels there that is no noise.
 BAND_PX, BELOW, BEYOND, COVERED_SHARE = 8, 12, 6, 0.2
@@ -123,11 +122,9 @@ class _Seen:
         return float(steps.max() / grey.shape[1])
 
     @cached_property
-    def positions(self) -> tuple[tuple[float, float], ...]:
-        """Edge and tip of both fingers, each with its standard uncertainty (pixels)."""
-        vertical = self.gap.direction.is_vertical
-        edges = [(one.x_px if vertical else one.y_px, one.u_across_px) for one in self.fingers]
-        return (*edges, *((one.tip_px, one.u_tip_px) for one in self.fingers))
+    def place(self) -> Place:
+        """Edges and tips of both fingers."""
+        return place(self.frame.index, self.gap)
 
 
 class FrameSequence:
@@ -155,7 +152,9 @@ class FrameSequence:
         if isinstance(item, Frame) and isinstance(outcome, GapMeasurement) and item.time_s is not None:
             now = _Seen(item, outcome)
             suspects.append(now)
-            if self._sound and (not _jumps(self._sound, now) or _is_alike(self._sound[-1], now)):
+            if self._sound and (
+                not jumps([one.place for one in self._sound], now.place) or _is_alike(self._sound[-1], now)
+            ):
                 return self._released(now)
             if len(suspects) > 1 and _is_alike(suspects[-2], now):
                 return self._released(now)
@@ -173,7 +172,7 @@ class FrameSequence:
         sound = [one for one in suspects if judge is None or one.frame is judge.frame or _is_alike(judge, one)]
         refused = {one.frame.index for one in suspects} - {one.frame.index for one in sound}
         waiting, self._waiting = self._waiting, []
-        self._sound = (self._sound + sound)[-2:]
+        self._sound = (self._sound + sound)[-3:]
         return [
             (item, LostFrame(item.index, item.time_s, Status.DAMAGED, WORDS) if item.index in refused else outcome)
             for item, outcome in waiting
@@ -188,36 +187,20 @@ def in_sequence(judged: Iterable[Judged]) -> Iterator[Judged]:
     yield from sequence.finish()
 
 
-def _jumps(sound: list[_Seen], now: _Seen) -> bool:
-    """Whether a finger is not where the motion in the last two frames leads it."""
-    last, before = sound[-1], sound[-2] if len(sound) > 1 else sound[-1]
-    if now.gap.direction is not last.gap.direction:
-        return True
-    gone, steps = last.frame.index - before.frame.index, now.frame.index - last.frame.index
-    share = steps / gone if gone else 0.0
-    return any(
-        abs(here - there - share * (there - earlier))
-        > JUMP_U * hypot(u, (1.0 + share) * u_there, share * u_earlier) + LEAST_JUMP_PX
-        for (here, u), (there, u_there), (earlier, u_earlier) in zip(
-            now.positions, last.positions, before.positions, strict=True
-        )
-    )
-
-
 def _is_alike(first: _Seen, second: _Seen) -> bool:
     """Whether both fingers have the same outlines in two frames, as far as these can be followed."""
     if first.gap.direction is not second.gap.direction or first.frame.pixels.shape != second.frame.pixels.shape:
         return False
-    moved_px = [abs(one - other) for (one, _), (other, _) in zip(first.positions, second.positions, strict=True)]
+    moved_px = np.abs(second.place.px - first.place.px)
     is_closed = _is_closed_in_bands(first, second)
     for k, (one, other) in enumerate(zip(first.fingers, second.fingers, strict=True)):
         bent_px = min(MOST_BENT_PX, BENT_SHARE * max(moved_px[k], moved_px[k + 2]))
         tolerance_px = JUMP_U * hypot(one.u_across_px, other.u_across_px) + CODED_PX + bent_px
         if not _agree(first.looks[k], second.looks[k], is_closed, tolerance_px):
             return False
-    along_px = [second.positions[k][0] - first.positions[k][0] for k in (2, 3)]
-    u_along_px = hypot(*(seen.positions[k][1] for seen in (first, second) for k in (2, 3)))
-    if abs(along_px[1] - along_px[0]) > JUMP_U * u_along_px + MOST_BENT_PX + max(moved_px[:2]):
+    along_px = np.diff(second.place.px - first.place.px)[2]
+    u_along_px = hypot(*first.place.u_px[2:], *second.place.u_px[2:])
+    if abs(along_px) > JUMP_U * u_along_px + MOST_BENT_PX + max(moved_px[:2]):
         return False
     return not (
         abs(first.torn_share - second.torn_share) > TORN_SHARE
@@ -267,7 +250,7 @@ def _is_closed(last: _Seen, frame: Frame) -> bool:
     covered = _is_like(pixels[first : first + BAND_PX], last.gap, last.looks[0].level).mean(axis=0) > 0.5
     # One finger alone is narrower, and what fills the gap leaves the outer sides where they were.
     unseen_px = max(0.5 * last.gap.gap_px, LEVEL_IN_BLURS * finger.blur_px)
-    ground = np.flatnonzero(~covered) - 0.5 * (last.positions[0][0] + last.positions[1][0])
+    ground = np.flatnonzero(~covered) - last.place.px[:2].mean()
     before, behind = ground[ground < -0.5 * unseen_px], ground[ground > 0.5 * unseen_px]
     if not before.size or not behind.size:
         return False

@@ -74,6 +74,8 @@ class RunTable:
         self._video: VideoSeeking | None = None
         self.camera: CameraModel | None = None
         """Camera of the recording; None until it is learnt."""
+        self.measured = 0
+        """Number of rows that were passed on."""
         self._waiting: Queue[Frame | LostFrame | _InVideo | None] = Queue()
         self._room, self._waits = Condition(), waits
         self._pictures, self._newest, self._is_complete = 0, -1, False
@@ -165,6 +167,7 @@ class RunTable:
 
     def _take(self, _: Sequence[Result], rows: Sequence[GapRow]) -> None:
         self._take_rows(rows)
+        self.measured += len(rows)
 
     def _outcome(self, frame: Frame, settings: Settings) -> GapMeasurement | NoGap:
         self.camera = settings.camera

@@ -10,17 +10,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.measuring.block_damage import SQUARE_PX, Levels, foreign_corners
+from fingervision.measuring.finger_motion import Place, jumps, place
 from fingervision.vision.grey import GreyImage, to_grey
 
-# Number of standard uncertainties by which a position must deviate from the extrapolation of the last two frames to
-# count as a jump.
-JUMP_U = 3.0
 # Least number of corners of foreign squares, and least step in units of the fingers' contrast. Undamaged videos (H.264
 # of crf 18 to 45, Motion JPEG of quality 3 to 31, steps of 7 and 16 px, noise of 1 to 4 levels, and videos of real
 # drops; 2000 frames, whole pictures) had at most one corner with steps of 0.08 of the contrast, and two corners with
@@ -36,8 +33,6 @@ WORDS = (
 )
 WORDS_BEHIND = "The frame is coded as a difference to a damaged frame."
 
-Points = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sound:
@@ -52,7 +47,7 @@ class SoundPictures:
 
     def __init__(self) -> None:
         self._last: _Sound | None = None
-        self._before: _Sound | None = None
+        self._places: list[Place] = []
         self._is_broken = False
 
     def judged(self, frame: Frame, outcome: GapMeasurement | NoGap) -> GapMeasurement | NoGap | LostFrame:
@@ -76,36 +71,16 @@ class SoundPictures:
             return LostFrame(frame.index, frame.time_s, Status.DAMAGED, WORDS_BEHIND)
         self._is_broken = False
         last = self._last
-        if last is not None and self._jumps(frame, outcome) and _is_foreign(frame, outcome, last):
+        now = place(frame.index, outcome) if isinstance(outcome, GapMeasurement) else None
+        # Without two frames directly before it, a frame cannot be compared with their motion.
+        follows = len(self._places) > 1 and frame.index - self._places[-2].at == 2
+        is_smooth = now is not None and follows and not jumps(self._places, now)
+        if last is not None and not is_smooth and _is_foreign(frame, outcome, last):
             self._is_broken = frame.coding is Coding.INTERFRAME
             return LostFrame(frame.index, frame.time_s, Status.DAMAGED, WORDS)
-        if isinstance(outcome, GapMeasurement):
-            self._before, self._last = last, _Sound(frame, outcome)
+        if now is not None and isinstance(outcome, GapMeasurement):
+            self._places, self._last = [*self._places, now][-3:], _Sound(frame, outcome)
         return outcome
-
-    def _jumps(self, frame: Frame, outcome: GapMeasurement | NoGap) -> bool:
-        """Whether a position deviates from the motion in the two previous frames, or cannot be compared with it."""
-        last, before = self._last, self._before
-        if last is None or before is None or not isinstance(outcome, GapMeasurement):
-            return True
-        if frame.index - last.frame.index != 1 or last.frame.index - before.frame.index != 1:
-            return True
-        here, u = _points(outcome)
-        there, u_there = _points(last.outcome)
-        earlier, u_earlier = _points(before.outcome)
-        u_all = np.sqrt(u**2 + 4.0 * u_there**2 + u_earlier**2)
-        return bool(np.any(np.abs(here - 2.0 * there + earlier) > JUMP_U * u_all))
-
-
-def _points(outcome: GapMeasurement) -> tuple[Points, Points]:
-    """Edge and tip of both fingers, each with its coordinate and its standard uncertainty (pixels)."""
-    sides = (outcome.left, outcome.right)
-    vertical = outcome.direction.is_vertical
-    across = [side.x_px if vertical else side.y_px for side in sides]
-    return (
-        np.array([*across, *(side.tip_px for side in sides)]),
-        np.array([*(side.u_across_px for side in sides), *(side.u_tip_px for side in sides)]),
-    )
 
 
 def _is_foreign(frame: Frame, outcome: GapMeasurement | NoGap, last: _Sound) -> bool:

@@ -244,7 +244,9 @@ def test_a_disk_that_stands_still_holds_up_nobody_and_ends_the_recording_with_a_
 ) -> None:
     monkeypatch.setattr(recorder_module, "FRAMES_WAITING", 3)
     goes_on = Event()
-    run = SimpleNamespace(path=tmp_path, is_there=True, event=lambda *_: goes_on.wait(), close=lambda _: None)
+    run = SimpleNamespace(
+        path=tmp_path, is_there=True, frames=0, measured=0, event=lambda *_: goes_on.wait(), close=lambda _: None
+    )
     recorder = recorder_module.Recorder(run, Supervisor(lambda *_: None))  # type: ignore[arg-type]
     thread = Thread(target=lambda: [recorder.add(("name", "words")) for _ in range(10)], daemon=True)
     thread.start()

@@ -158,6 +158,7 @@ def test_a_recording_that_is_too_slow_names_the_bottleneck(
     is_busy: bool, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recorder_module, "FRAMES_WAITING", 10)
+    monkeypatch.setattr(recorder_module, "FRAMES_UNTIL_HURRY", 2)
 
     def work(*_: object) -> None:
         end_s = time.thread_time() + 0.05
@@ -166,12 +167,34 @@ def test_a_recording_that_is_too_slow_names_the_bottleneck(
         if not is_busy:
             time.sleep(0.05)
 
-    run = SimpleNamespace(path=tmp_path, is_there=True, event=work, close=lambda _: None)
+    run = SimpleNamespace(path=tmp_path, is_there=True, frames=0, measured=0, event=work, close=lambda _: None)
     recorder = recorder_module.Recorder(run, Supervisor(lambda *_: None))  # type: ignore[arg-type]
     until(lambda: recorder.add(("name", "words")) or time.sleep(0.01) or recorder.failure)
     assert recorder.failure.startswith(what)
     with suppress(OutputError):
         recorder.stop()
+
+
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_what_waits_when_a_recording_stops_is_finished_as_long_as_it_goes_on(
+    *, goes_on: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_module, "PATIENCE_S", 0.5)
+    run = SimpleNamespace(path=tmp_path, is_there=True, frames=0, measured=0, event=lambda *_: None)
+
+    def measure(_: str) -> None:
+        for _ in range(10):
+            time.sleep(0.2)
+            run.measured += goes_on
+
+    run.close = measure
+    recorder = recorder_module.Recorder(run, Supervisor(lambda *_: None))  # type: ignore[arg-type]
+    if goes_on:
+        recorder.stop()
+        assert run.measured == 10
+    else:
+        with pytest.raises(OutputError, match="too slow"):
+            recorder.stop()
 
 
 def test_an_interrupt_while_starting_is_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
