@@ -147,6 +147,32 @@ def flattened(input_mm: Array, sigma_mm: float, still: float) -> Array:
     return out
 
 
+BARELY = 1e-3
+"""Share of the standard uncertainty of the recorded input below which noise in addition to the encoder's rounding is
+neglected."""
+
+
+def read_again(path_mm: Array, sigma_mm: float, step_mm: float, rng: np.random.Generator) -> Array:
+    """Record a path again, with random noise and a random zero of the encoder; shape (n,) (mm).
+
+    Parameters
+    ----------
+    path_mm : ndarray of float, shape (n,)
+        The path at the rows.
+    sigma_mm, step_mm : float
+        Results of `encoder.input_sigma`.
+    rng : numpy Generator
+        Generator of noise and zero.
+    """
+    noise_mm = float(np.sqrt(max(0.0, sigma_mm**2 - step_mm**2 / 12.0)))
+    noise_mm = noise_mm if noise_mm > BARELY * sigma_mm else 0.0
+    read_mm = path_mm + noise_mm * rng.standard_normal(path_mm.size)
+    if step_mm > 0.0:
+        zero = rng.random()
+        read_mm = (np.round(read_mm / step_mm - zero) + zero) * step_mm
+    return read_mm
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SmoothedRecord:
     """A stage's record without the jitter about its encoder's lines, smoothed as far as its errors are random.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.effect import Array
 from fingervision.motion.encoder_path import STANDS, level_halts, piece, sharp_reversals
-from fingervision.motion.local_polynomial_smoothing import CORNER_ROWS, SmoothedRecord, flattened
+from fingervision.motion.local_polynomial_smoothing import CORNER_ROWS, SmoothedRecord, flattened, read_again
 
 LONG_ROWS = 4 * CORNER_ROWS
 """Number of rows above which the ends of a stretch are left out when its rounding errors are examined."""
@@ -21,6 +21,8 @@ RIPPLE = 0.5
 """Share of a smoothed stroke's variance that changes from one encoder line to the next, because the smoothing window
 then ends at another line. If this share counted as common to a window, ripples of the path could determine the offset.
 """
+
+
 LEAST_LEVERAGE = 1.0 / 241.0
 """Leverage of a row in the widest window of the smoothing."""
 
@@ -58,10 +60,6 @@ class ErrorParts:
 
     Parameters
     ----------
-    rows_mm : ndarray of float, shape (rows,)
-        Standard uncertainty of each row by its own noise or rounding.
-    span : ndarray of float, shape (rows,)
-        Number of rows over which the noise was averaged.
     between_mm : ndarray of float, shape (n,)
         Standard uncertainty of the curve at each point of the path, towards the outside of its bend; zero at a row.
     interval : ndarray of int, shape (n,)
@@ -70,8 +68,6 @@ class ErrorParts:
         Times at which two straight lines meet, and the change of speed there.
     """
 
-    rows_mm: Array
-    span: Array
     between_mm: Array
     interval: NDArray[np.intp]
     corner_s: Array
@@ -92,8 +88,8 @@ class LogPath:
         Errors that neighbouring rows have in common.
     rows : DriveHistory
         The log itself.
-    step_mm : float
-        Step of the log's encoder; 0 if no step is found.
+    record : SmoothedRecord
+        The log's rows, smoothed.
     parts : ErrorParts
         Contributions to the uncertainty.
     corner_s, u_corner_s : float
@@ -104,7 +100,7 @@ class LogPath:
     u_mm: Array
     shared: SharedErrors
     rows: DriveHistory
-    step_mm: float
+    record: SmoothedRecord
     parts: ErrorParts
     corner_s: float = 0.0
     u_corner_s: float = 0.0
@@ -123,32 +119,24 @@ class LogPath:
         ends = np.cumsum([0, *lengths])
         runs = tuple(slice(int(begin), int(end)) for begin, end in pairwise(ends))
         record = SmoothedRecord.of(log.input_mm, log.time_s, runs)
-        snapped_mm, sigma_mm, step_mm = record.recorded_mm, record.sigma_mm, record.step_mm
-        smooth_mm, leverage = record.smooth_mm.copy(), record.leverage
-        u_mm = sigma_mm * np.sqrt(leverage)
-        for run in runs:
-            still = _standing_step(smooth_mm[run], sigma_mm, leverage[run])
-            smooth_mm[run] = flattened(smooth_mm[run], sigma_mm, still)
-        still = _standing_step(smooth_mm, sigma_mm, leverage)
+        smooth_mm, still = _levelled(record)
+        u_mm, leverage = record.sigma_mm * np.sqrt(record.leverage), record.leverage
         shared = SharedErrors(np.zeros(0), np.zeros(1), np.zeros(1, dtype=np.bool_), np.zeros(1))
-        if step_mm > 0.0:
-            for run in runs:
-                smooth_mm[run] = level_halts(log.time_s[run], snapped_mm[run], smooth_mm[run], step_mm)
-                smooth_mm[run] = sharp_reversals(log.time_s[run], snapped_mm[run], smooth_mm[run], step_mm)
-            shared, u_mm = _shared_errors(log.time_s, snapped_mm, smooth_mm, u_mm, leverage, still, step_mm)
+        if record.step_mm > 0.0:
+            shared, u_mm = _shared_errors(
+                log.time_s, record.recorded_mm, smooth_mm, u_mm, leverage, still, record.step_mm
+            )
         pieces = [piece(log.time_s[run], smooth_mm[run], u_mm[run]) for run in runs]
         of_runs = tuple(names[run.start] for run, part in zip(runs, pieces, strict=True) for _ in part[0])
         time_s, input_mm, errors = (np.concatenate([part[k] for part in pieces]) for k in range(3))
         drive = DriveHistory(time_s, input_mm, None if log.run is None else of_runs)
         before = np.cumsum([0, *(part[0].size for part in pieces[:-1])])
         parts = ErrorParts(
-            u_mm,
-            np.ones(u_mm.size) if step_mm > 0.0 else 1.0 / np.clip(leverage, LEAST_LEVERAGE, 1.0),
             np.concatenate([part[3] for part in pieces]),
             np.concatenate([part[4] + int(first) for part, first in zip(pieces, before, strict=True)]),
             *(np.concatenate([part[k] for part in pieces]) for k in (5, 6)),
         )
-        return cls(drive, errors, shared, log, step_mm, parts)
+        return cls(drive, errors, shared, log, replace(record, smooth_mm=smooth_mm), parts)
 
     def rounded(self, corner_s: float) -> "LogPath":
         """Give every corner another duration, as under constant acceleration: two tangents and a parabola."""
@@ -206,6 +194,20 @@ class LogPath:
             return (slice(0, self.drive.time_s.size),) * len(names)
         own = np.array(self.drive.run)
         return tuple(slice(int(at[0]), int(at[-1]) + 1) for at in (np.flatnonzero(own == name) for name in names))
+
+
+def _levelled(record: SmoothedRecord) -> tuple[Array, float]:
+    """Smoothed rows that do not overshoot rests and turn sharply, and the motion from row to row of a rest (mm)."""
+    smooth_mm, runs = record.smooth_mm.copy(), record.runs
+    for run in runs:
+        still = _standing_step(smooth_mm[run], record.sigma_mm, record.leverage[run])
+        smooth_mm[run] = flattened(smooth_mm[run], record.sigma_mm, still)
+    still = _standing_step(smooth_mm, record.sigma_mm, record.leverage)
+    for run in runs if record.step_mm > 0.0 else ():
+        row = record.time_s[run], record.recorded_mm[run]
+        smooth_mm[run] = level_halts(*row, smooth_mm[run], record.step_mm)
+        smooth_mm[run] = sharp_reversals(*row, smooth_mm[run], record.step_mm)
+    return smooth_mm, still
 
 
 def _shared_errors(
@@ -311,11 +313,12 @@ far, which is 1.7 times the rounding's standard uncertainty.
 def drawn_paths(path: LogPath) -> Iterator[LogPath]:
     """Draw paths of the stage that are compatible with the log's rows.
 
-    Four kinds of error are drawn. First, smoothing averages the noise over several rows, so that the errors of
-    neighbouring rows are correlated. Second, the rounding error of an encoder is common to all rows of a halt, a
-    reversal, or a stretch of a stroke. Third, a corner may lie anywhere between two rows, and a smooth curve cuts all
-    corners on the same side. Reversals between two lines of an encoder are cut on the same side as well, by the
-    rounding and by the smoothing. Fourth, all corners last longer or shorter, where the duration was estimated.
+    Four kinds of error are drawn. First, the path is recorded again, with random noise and a random zero of the
+    encoder, and its error averaged over as many rows as the smoothing averages. The error of rounding is the same in
+    all rows of a stroke if the stage moves by nearly whole steps from row to row. Second, a halt or a reversal may be
+    anywhere within a step of the encoder, and all reversals between two lines are cut on the same side. Third, a corner
+    may lie anywhere between two rows, and a smooth curve cuts all corners on the same side. Fourth, all corners last
+    longer or shorter, where the duration was estimated.
 
     Parameters
     ----------
@@ -327,26 +330,27 @@ def drawn_paths(path: LogPath) -> Iterator[LogPath]:
     LogPath
     """
     rng = np.random.default_rng(SEED)
-    time_s, parts, shared = path.drive.time_s, path.parts, path.shared
-    stretch = np.searchsorted(shared.begin_s, time_s, side="right")
+    record, time_s, parts, shared = path.record, path.drive.time_s, path.parts, path.shared
+    stretch = np.searchsorted(shared.begin_s, path.rows.time_s, side="right")
+    span = 1.0 / np.clip(record.leverage, LEAST_LEVERAGE, 1.0)
     for _ in range(DRAWS):
-        rows_mm = parts.rows_mm * _averaged(rng.normal(size=parts.rows_mm.size), parts.span)
+        read_mm = read_again(record.smooth_mm, record.sigma_mm, record.step_mm, rng)
+        moving_mm = _averaged(read_mm - record.smooth_mm, span)
+        halted_mm = shared.u_mm * (rng.normal(size=shared.u_mm.size) + TURNS_ALIKE * rng.normal() * shared.outward)
+        rows_mm = np.where(shared.halts[stretch], halted_mm[stretch], moving_mm)
         common = np.sqrt(ALIKE) * rng.normal()
         own = np.sqrt(1.0 - ALIKE) * rng.normal(size=int(parts.interval.max()) + 1)
         input_mm = path.drive.input_mm + np.interp(time_s, path.rows.time_s, rows_mm)
         input_mm = input_mm + (common + own[parts.interval]) * parts.between_mm
-        errors_mm = shared.u_mm * rng.normal(size=shared.u_mm.size)
-        errors_mm += TURNS_ALIKE * shared.u_mm * rng.normal() * shared.outward
-        input_mm = input_mm + errors_mm[stretch]
         drawn = replace(path, drive=replace(path.drive, input_mm=input_mm))
         yield drawn.rounded(abs(path.corner_s + path.u_corner_s * rng.normal())) if path.u_corner_s else drawn
 
 
-def _averaged(white: Array, span: Array) -> Array:
-    """Mean of white noise over `span` rows about each row, scaled to a variance of 1."""
-    sums = np.append(0.0, np.cumsum(white))
-    rows = np.arange(white.size)
+def _averaged(values: Array, span: Array) -> Array:
+    """Mean of values over `span` rows about each row."""
+    sums = np.append(0.0, np.cumsum(values))
+    rows = np.arange(values.size)
     half = 0.5 * (span - 1.0)
     low = np.clip(np.round(rows - half), 0, rows).astype(int)
-    high = np.clip(np.round(rows + half), rows, white.size - 1).astype(int) + 1
-    return np.asarray((sums[high] - sums[low]) / np.sqrt(high - low))
+    high = np.clip(np.round(rows + half), rows, values.size - 1).astype(int) + 1
+    return np.asarray((sums[high] - sums[low]) / (high - low))

@@ -207,12 +207,12 @@ class RecordedInput:
         shared_mm = log.shared.u_mm[np.searchsorted(log.shared.begin_s, time_s[table.path_rows], side="right")]
         stays = np.ones(smooth_mm.size, dtype=bool)
         passing_mm = slope * u_mm if stamps_mm is None else np.hypot(stamps_mm, slope * u_mm)
-        sigma_mm = max(float(np.median(u_mm)), log.step_mm / float(np.sqrt(12.0)))
+        sigma_mm = max(float(np.median(u_mm)), log.record.step_mm / float(np.sqrt(12.0)))
         return cls(
             smooth_mm,
             along_mm,
             sigma_mm,
-            log.step_mm,
+            log.record.step_mm,
             slope * shared_mm,
             stays,
             HELD_SAMPLES,

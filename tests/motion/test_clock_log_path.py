@@ -6,7 +6,7 @@ import pytest
 from fingervision.domain.drive import DriveHistory
 from fingervision.motion.clock.noise import even_variance
 from fingervision.motion.encoder import input_sigma, on_lines
-from fingervision.motion.log_path import LogPath
+from fingervision.motion.log_path import LogPath, drawn_paths
 from tests.benchmarks import drawn_recordings
 
 STEP_MM = 0.002
@@ -41,7 +41,7 @@ def test_reversals_between_two_lines_are_not_cut(row_s, step):
     tops = np.where(np.arange(corners.size) % 2, 0.5 + 0.2 * rng.random(corners.size), 0.1 * rng.random(corners.size))
     place = np.interp(time_s, corners, tops)
     path = LogPath.of(DriveHistory(time_s, np.round(place / step) * step))
-    assert path.step_mm == pytest.approx(step)
+    assert path.record.step_mm == pytest.approx(step)
     # At the row next to each reversal; between two rows the curve cuts it besides.
     at = [int(np.argmin(np.abs(time_s - corner_s))) for corner_s in corners[1:-1]]
     drawn = np.interp(time_s[at], path.drive.time_s, path.drive.input_mm)
@@ -87,7 +87,7 @@ def test_a_rounded_turn_between_two_rows_is_drawn_finely_enough_for_the_play():
 
 def test_a_record_that_ends_within_an_encoders_line_is_read():
     one = drawn_recordings.draw(232003, creep=0.02)
-    assert LogPath.of(DriveHistory(one.log_s, one.input_mm)).step_mm > 0.0
+    assert LogPath.of(DriveHistory(one.log_s, one.input_mm)).record.step_mm > 0.0
 
 
 def test_a_halt_between_two_lines_is_at_its_reading():
@@ -104,7 +104,7 @@ def test_a_halt_between_two_lines_is_at_its_reading():
     time_s = np.arange(0.0, now_s, 0.0146)
     step = 0.0126
     path = LogPath.of(DriveHistory(time_s, np.round(np.interp(time_s, corners_s, corners_mm) / step) * step))
-    assert path.step_mm == pytest.approx(step)
+    assert path.record.step_mm == pytest.approx(step)
     halts_s = np.array(corners_s[2::2]) + 0.3
     found = np.interp(halts_s, path.drive.time_s, path.drive.input_mm)
     np.testing.assert_allclose(found, np.round(np.array(corners_mm[2::2]) / step) * step, atol=1e-9)
@@ -123,3 +123,18 @@ def test_a_corner_on_a_row_does_not_lie_between_rows_however_the_times_are_round
     path = LogPath.of(DriveHistory(time_s, np.round(np.interp(time_s, [0.6, 4.6, 6.0], [0.0, 1.5, 0.975]), 6)))
     assert path.parts.corner_s.size == 0
     assert path.drive.input_mm.max() == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("lines_a_row", [0.13, 0.37, 0.9])
+def test_drawn_errors_of_an_encoder_are_as_large_as_its_own(lines_a_row):
+    # Drawn without the averaging over the rows of a stroke, they were two to four times as large.
+    time_s, speed = 0.08 * np.arange(600), lines_a_row * 0.025 / 0.08
+    place = 0.007 + speed * np.abs((time_s + 5.0) % 10.0 - 5.0)
+    path = LogPath.of(DriveHistory(time_s, np.round(place / 0.025) * 0.025))
+
+    def at_rows(drive):
+        return np.interp(time_s, drive.time_s, drive.input_mm)
+
+    own_mm = float(np.std(at_rows(path.drive) - place))
+    drawn_mm = np.std([at_rows(one.drive) - at_rows(path.drive) for one in drawn_paths(path)])
+    assert 0.7 * own_mm < drawn_mm < 2.2 * own_mm

@@ -1,12 +1,15 @@
 """Posterior odds of explanations: whether one is far more probable than another, and the smallest effects so found."""
 
+from itertools import islice
 from math import comb
 
 import numpy as np
 
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.signatures import Signatures
 from fingervision.diagnosis.input.record_nuisances import below_the_input
+from fingervision.domain.effect import Array
 
 FREEDOM = 4.0
 """Degrees of freedom of Student's t distribution for the physical priors: typical sizes are known only roughly, so that
@@ -17,6 +20,11 @@ doi:10.1080/01621459.1995.10476572)."""
 
 SURELY = 1.645
 """Standard deviations that nineteen of twenty values do not exceed."""
+
+
+def rms(values: Array) -> float:
+    """Root mean square of values."""
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def noise_doubt(problem: Problem) -> float:
@@ -120,7 +128,34 @@ def follows_the_input(problem: Problem, one: Explanation, base: Explanation) -> 
     if not base.names and not _may_follow_errors(problem, one, base):
         return False
     change = problem.chain.stacked(one.values) - problem.chain.stacked(base.values)
-    return below_the_input(problem, float(np.sqrt(np.mean(change**2))))
+    return below_the_input(problem, rms(change))
+
+
+PATHS, TWICE = 8, 2.0
+"""Number of other paths of the log to which an effect is fitted (the RMS of its change is then known to a quarter), and
+least ratio of its change to this RMS: two standard uncertainties."""
+
+
+def beyond_the_log(problem: Problem, found: list[Explanation], base: Explanation) -> list[Explanation]:
+    """Drop the likeliest of some explanations as long as it changes `base` no more than an encoder's log can.
+
+    An effect with memory is also fitted to what `base` predicts along other paths that the log permits, where it does
+    not act. In a log of an encoder with one step from row to row, a limit at the stage's own speed removed most of the
+    path's error, although nothing was hidden.
+    """
+    kept, behind_encoder = list(found), problem.chain.history.input_step_mm > 0.0
+    while behind_encoder and kept:
+        one = min(kept, key=lambda explanation: explanation.bic)
+        if not _may_follow_errors(problem, one, base):
+            break
+        alone = problem.chain.stacked(base.values)
+        aims = [problem.whitener.one(chain.stacked(base.values)) for chain in islice(problem.other_paths(), PATHS)]
+        fits = [fit(problem, one.names, one.values, target=aim, sigma_mm=base.sigma_mm, iterations=5) for aim in aims]
+        caused = [problem.chain.stacked(each.values) - alone for each in fits]
+        if not fits or rms(problem.chain.stacked(one.values) - alone) > TWICE * rms(np.array(caused)):
+            break
+        kept = [explanation for explanation in kept if explanation is not one]
+    return kept
 
 
 def detection_limits(problem: Problem, atoms: Signatures, nothing: Explanation) -> dict[str, dict[str, object]]:

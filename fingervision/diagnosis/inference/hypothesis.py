@@ -1,6 +1,6 @@
 """A hypothesis: a set of effects with fitted parameters, and the statistics by which it is judged."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -86,6 +86,8 @@ class Problem:
         without a map.
     random : tuple of (str, int)
         Names of the random effects beside every explanation, with their numbers of columns, in order.
+    other_paths : callable
+        Returns measuring chains along other paths that the log of the stage permits; none without a log.
     """
 
     chain: MeasuringChain
@@ -97,6 +99,7 @@ class Problem:
     stalled: frozenset[str] = frozenset()
     mapped: float = 0.0
     random: tuple[tuple[str, int], ...] = ()
+    other_paths: Callable[[], Iterable[MeasuringChain]] = tuple
     _searched: dict[str, list[tuple[str, Parameter]]] = field(default_factory=dict, init=False, repr=False)
 
     @property

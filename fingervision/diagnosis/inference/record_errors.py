@@ -23,8 +23,7 @@ from fingervision.diagnosis.noise.channel_noises import (
 from fingervision.diagnosis.noise.noise_model import Noise
 from fingervision.domain.effect import Array, Flags
 from fingervision.motion.input_path import recorded
-from fingervision.motion.local_polynomial_smoothing import SmoothedRecord
-from fingervision.motion.log_path import drawn_paths
+from fingervision.motion.local_polynomial_smoothing import SmoothedRecord, read_again
 from fingervision.motion.recursion import recursion
 
 FEWEST_POWERS = 20
@@ -106,9 +105,6 @@ FEWEST_RECORDS = 8
 ASSUMED, LEAST_LEFT = 100, 0.05
 """Number of draws of the input's errors as the likelihood assumes them (their variance is then known to a seventh), and
 least share of the variance of an estimate that is left to all other causes."""
-BARELY = 1e-3
-"""Share of the standard uncertainty of the recorded input below which noise in addition to the encoder's rounding is
-neglected."""
 
 
 def settled_with_records(
@@ -282,21 +278,9 @@ def simulated_records(data: Observations, rng: np.random.Generator) -> Iterator[
     if time_s is None:
         return
     if record.log is not None:
-        along = chain.along
-        for drawn in drawn_paths(record.log):
-            error_mm = np.empty(along.history.input_mm.size)
-            for run, points in zip(along.history.runs, record.log.runs(data.table.run_names), strict=True):
-                away_mm = drawn.drive.input_mm[points] - record.log.drive.input_mm[points]
-                error_mm[run] = np.interp(along.history.times[run], record.log.drive.time_s[points], away_mm)
-            yield chain.along_errors(error_mm)
+        yield from data.other_paths()
         return
-    path_mm, step_mm = record.along_mm, record.step_mm
-    noise_mm = float(np.sqrt(max(0.0, record.sigma_mm**2 - step_mm**2 / 12.0)))
-    noise_mm = noise_mm if noise_mm > BARELY * record.sigma_mm else 0.0
+    path_mm, sigma_mm, step_mm = record.along_mm, record.sigma_mm, record.step_mm
     for _ in range(int(np.clip(MOST_ROWS // path_mm.size, FEWEST_RECORDS, RECORDS))):
-        read_mm = path_mm + noise_mm * rng.standard_normal(path_mm.size)
-        if step_mm > 0.0:
-            zero = rng.random()
-            read_mm = (np.round(read_mm / step_mm - zero) + zero) * step_mm
-        again = SmoothedRecord.known(read_mm, time_s, runs, record.sigma_mm, step_mm)
+        again = SmoothedRecord.known(read_again(path_mm, sigma_mm, step_mm, rng), time_s, runs, sigma_mm, step_mm)
         yield chain.with_input(chain.history.input_mm + (again.path_mm - path_mm)[data.table.path_rows])

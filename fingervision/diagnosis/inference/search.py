@@ -7,7 +7,13 @@ from functools import partial
 import numpy as np
 
 from fingervision.diagnosis.inference.ambiguity_set import ambiguity_set, beside_foretold
-from fingervision.diagnosis.inference.evidence import detection_limits, follows_the_input, odds, speaks_for
+from fingervision.diagnosis.inference.evidence import (
+    beyond_the_log,
+    detection_limits,
+    follows_the_input,
+    odds,
+    speaks_for,
+)
 from fingervision.diagnosis.inference.explanation_candidates import (
     LEAST_GAIN,
     Progress,
@@ -80,6 +86,7 @@ def _one_effect(state: SearchState, forced: frozenset[str]) -> SearchState:
     """Fit every effect alone; keep the likeliest, if its gain is significant."""
     problem = state.problem
     singles = [e for e in single_effects(problem, state.atoms, 20) if not follows_the_input(problem, e, state.nothing)]
+    singles = beyond_the_log(problem, singles, state.nothing)
     state = replace(state, singles=singles)
     if not singles:
         return state
@@ -107,6 +114,7 @@ def _two_effects(state: SearchState, progress: Progress) -> SearchState:
     # Pairs are compared with the best single effect: compared with a simpler formula, a second effect would gain what a
     # richer formula has already gained.
     clear = [e for e in pairs[:LIKELIEST] if beyond_form(state, singles[0], e)]
+    clear = beyond_the_log(problem, clear, singles[0])
     return replace(state, best=likeliest(clear), peers=pairs) if speaks_for(problem, clear, singles[0]) else state
 
 

@@ -1,6 +1,6 @@
 """Prepare the measurement: smooth the input, exclude outliers, estimate the noise, whiten."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -38,6 +38,7 @@ from fingervision.motion.input_path import (
     turning_readings,
     unseen_turns,
 )
+from fingervision.motion.log_path import drawn_paths
 from fingervision.motion.recorded_input import RecordedInput
 
 FEWEST_EQUAL = 6
@@ -298,7 +299,20 @@ class Observations:
             self.stalled,
             mapped,
             tuple((name, columns.shape[1]) for name, columns in random.items()),
+            self.other_paths,
         )
+
+    def other_paths(self) -> Iterator[MeasuringChain]:
+        """Measuring chains along other paths that the log of the stage permits; none without a log."""
+        log, along = self.recorded.log, self.chain.along.history
+        if log is None:
+            return
+        for drawn in drawn_paths(log):
+            error_mm = np.empty(along.input_mm.size)
+            for run, points in zip(along.runs, drawn.runs(self.table.run_names), strict=True):
+                away_mm = drawn.drive.input_mm[points] - log.drive.input_mm[points]
+                error_mm[run] = np.interp(along.times[run], log.drive.time_s[points], away_mm)
+            yield self.chain.along_errors(error_mm)
 
     def without_stamps(self, residual_mm: Array) -> Array:
         """Reduce a residual of the gap to the variance that it would have without rounded times; shape (n,).

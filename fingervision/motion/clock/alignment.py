@@ -90,7 +90,7 @@ def crossed_in_s(path: LogPath) -> float:
     """Time (s) in which the moving stage passes one encoder step; 0 without an encoder step."""
     steps_mm, steps_s = np.abs(np.diff(path.drive.input_mm)), np.diff(path.drive.time_s)
     moving = steps_mm > 0.1 * float(steps_mm.max())
-    return float(path.step_mm * np.median(steps_s[moving] / steps_mm[moving]))
+    return float(path.record.step_mm * np.median(steps_s[moving] / steps_mm[moving]))
 
 
 def stated(
@@ -161,7 +161,7 @@ def stated(
     crossing_s = crossed_in_s(motion.path)
     if crossing_s > COARSE * frame_s:
         notes.append(
-            f"The drive's encoder has steps of {1e3 * motion.path.step_mm:.3g} µm, and the stage takes "
+            f"The drive's encoder has steps of {1e3 * motion.path.record.step_mm:.3g} µm, and the stage takes "
             f"{crossing_s:.2g} s for one step: the unknown position within a step affects the offset, whose error may "
             "exceed one frame."
         )
