@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import TypeVar
 
 import numpy as np
 
+from fingervision.diagnosis.inference.evidence import PATHS, TWICE, rms
 from fingervision.diagnosis.inference.explanation_candidates import different
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit, refit
@@ -111,7 +113,7 @@ def beside_map(state: Searched, look: Look) -> Searched:
         return beside
     if not foretells_other_passes(plain, plain.judged(beside.found.best, beside.found.best.values), first):
         return state
-    if below_the_input(plain, float(np.sqrt(np.mean(first.fitted_mm**2)))):
+    if below_the_input(plain, rms(first.fitted_mm)) or _follows_the_log(beside.found, first):
         # If a stage returns to the same positions, its encoder rounds them equally; these errors are no effect.
         return state
     # If effects explain the data and the map replaces none of them, the map only describes the inexactness of their
@@ -119,6 +121,17 @@ def beside_map(state: Searched, look: Look) -> Searched:
     stays = found.unknown is None and set(found.best.names) <= set(beside.found.best.names)
     worse = found.unknown is None and beside.found.unknown is not None
     return beside if not (stays or worse) and _gained(state, beside, first) > LEAST_GAIN else state
+
+
+def _follows_the_log(found: Findings, position_map: PositionMap) -> bool:
+    """Whether a map changes the prediction no more than the maps that errors of the log alone would cause."""
+    problem, best = found.problem, found.best
+    alone, caused = problem.chain.stacked(best.values), []
+    for chain in islice(problem.other_paths(), PATHS):
+        moved = replace(problem, measured=problem.measured + problem.whitener.one(chain.stacked(best.values) - alone))
+        caused.append(position_map.refitted(moved, moved.judged(best, best.values)).fitted_mm)
+    own_mm = position_map.refitted(problem, best).fitted_mm
+    return bool(caused) and rms(own_mm) < TWICE * rms(np.array(caused) - own_mm)
 
 
 def _contested(state: Searched, reason: str) -> Searched:
