@@ -93,6 +93,15 @@ def test_a_required_effect_that_is_hardly_there_is_measured_beside_two_that_are(
     assert np.std(found.residual_after_mm["gap"]) < 0.002
 
 
+def test_a_required_effect_that_the_data_do_not_show_is_refuted_in_words() -> None:
+    sound = fv.diagnose(table(0.0), SIMULATION, with_effects=["rest_gap_error"])
+    assert sound.verdict == "agrees"
+    assert any("rest_gap_error was required" in note and "20 to 1" in note for note in sound.report.notes)
+    beside = fv.diagnose(table(0.02), SIMULATION, with_effects=["end_stop"])
+    assert {effect.name for effect in beside.effects} >= {"end_stop"}
+    assert any("end_stop was required" in note and "20 to 1" in note for note in beside.report.notes)
+
+
 def test_the_corrected_model_answers_and_is_written(tmp_path: Path) -> None:
     found = fv.diagnose(table(0.02), SIMULATION, with_effects=["rest_gap_error"])
     assert {effect.name for effect in found.effects} == {"rest_gap_error"}

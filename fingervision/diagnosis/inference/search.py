@@ -209,7 +209,11 @@ def _insisted(state: SearchState, forced: frozenset[str]) -> SearchState:
     begins = [required | dict(base.values) for base in bases]
     together = [fit(problem, tuple(begin), begin, iterations=20) for begin in begins]
     peers = [*holding, *together]
-    return replace(state, best=likeliest(peers), peers=peers, imitation=None)
+    best = likeliest(peers)
+    if set(best.names) <= able and not speaks_for(problem, [best], state.nothing):
+        # Beside another effect, a required one that is not seen widens the uncertainty; alone, it is refuted.
+        best = problem.nothing()
+    return replace(state, best=best, peers=peers, imitation=None)
 
 
 def _indistinguishable(

@@ -298,7 +298,7 @@ def diagnosis_report(
         runners_up=runners_up,
         notes=(
             *((tried(runners_up),) if decided is Verdict.UNKNOWN and not mistaken else ()),
-            *required_words(data, best, forced, mapped=mapped),
+            *required_words(data, found.problem, best, forced, mapped=mapped),
             *data.notes,
             *data.refitted(),
             *(() if mistake is None else (mistake.words,)),

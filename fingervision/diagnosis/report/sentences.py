@@ -5,7 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from fingervision.diagnosis.inference.evidence import speaks_for
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis_fit import fit
 from fingervision.diagnosis.inference.verdict import UNDECIDED, Standing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array
@@ -156,16 +158,20 @@ def tried(singles: tuple[Mapping[str, object], ...]) -> str:
     return f"alone, of the squared disagreement {', '.join(told)} would be explained; pairs and triples were tried too."
 
 
-def required_words(data: Observations, best: Explanation, forced: frozenset[str], *, mapped: bool) -> tuple[str, ...]:
-    """Sentences on effects that the user required and that are not in the result: what speaks against each."""
-    kept = {*best.names, *(("position_error_map",) if mapped else ())}
-    beside = " beside " + " and ".join(sorted(kept)) if kept else ""
-    return tuple(
-        f"{name} was required (--with) and is not in the result: "
-        + data.excluded.get(name, f"{beside.strip() or 'without any effect'} it does not lower the disagreement")
-        + "."
-        for name in sorted(forced - kept)
-    )
+def required_words(
+    data: Observations, problem: Problem, best: Explanation, forced: frozenset[str], *, mapped: bool
+) -> tuple[str, ...]:
+    """Sentences on effects that the user required: what speaks against each that the data do not show."""
+    kept, said = {*best.names, *(("position_error_map",) if mapped else ())}, []
+    for name in sorted(forced):
+        others = " and ".join(sorted(kept - {name}))
+        low = f"the odds for it{' beside ' if others else ''}{others} are below 20 to 1"
+        rest = {other: values for other, values in best.values.items() if other != name}
+        if name not in kept:
+            said.append(f"{name} was required (--with) and is not in the result: {data.excluded.get(name, low)}.")
+        elif name in best.names and not speaks_for(problem, [best], fit(problem, tuple(rest), rest)):
+            said.append(f"{name} was required (--with) and stays in the result, but {low}.")
+    return tuple(said)
 
 
 def rows_beyond_model(data: Observations, best: Explanation) -> tuple[str, ...]:
