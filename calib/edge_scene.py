@@ -23,6 +23,22 @@ ALL_SIDES = 3.0
 EVEN: Floats = np.asarray((np.arange(10) + 0.5) / 10)
 EXPONENTIAL: Floats = np.asarray(0.3 * (np.arange(16) + 0.5))
 
+# Flanks on which something lies: a part of the fingers' inner sides, or what light from one side shows or hides.
+Faces = Callable[[Floats, Bools], Floats]
+
+
+def _inner(side: Floats, is_outer: Bools) -> Floats:
+    return np.where(is_outer, 0.0, 1.0)
+
+
+def _rightward(side: Floats, is_outer: Bools) -> Floats:
+    return np.where(side > 0.0, 1.0, 0.0)
+
+
+def _leftward(side: Floats, is_outer: Bools) -> Floats:
+    return np.where(side < 0.0, 1.0, 0.0)
+
+
 # Distances outwards and weights of all steps, shapes (sets, edges, steps), from parameters (sets, k), the direction of
 # each edge (+1: the ground has the larger coordinates), and whether it is an outer one.
 Steps = Callable[[Floats, Floats, Bools], tuple[Floats, Floats]]
@@ -76,7 +92,7 @@ def _nothing(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
     return np.zeros(shape), np.ones(shape)
 
 
-def _wall(faces: Callable[[Floats, Bools], Floats]) -> Steps:
+def _wall(faces: Faces) -> Steps:
     """Wall on the flanks for which `faces` is not zero, wide by its own parameter on flanks of either direction."""
 
     def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
@@ -89,14 +105,30 @@ def _wall(faces: Callable[[Floats, Bools], Floats]) -> Steps:
     return steps
 
 
-def _line(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
-    """Bright line on the finger: how far inside the edge it ends, its breadth, and its light over the contrast."""
-    outer = is_outer.astype(float)
-    near = np.broadcast_to(np.exp(p[:, :1]), (len(p), side.size))
-    far = near + np.exp(p[:, 1:2])
-    light = np.exp(p[:, 2:3] + p[:, 3:4] * outer)
-    edge = np.zeros_like(near)
-    return np.stack([edge, -far, -near], -1), np.stack([edge + 1.0, light, -light], -1)
+def _line(faces: Faces | None = None) -> Steps:
+    """Bright line on the finger: how far inside the edge it ends, its breadth, and its light over the contrast.
+
+    It lies along the flanks for which `faces` is not zero, or along all, where it may be unlike on outer ones.
+    """
+
+    def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+        near = np.broadcast_to(np.exp(p[:, :1]), (len(p), side.size))
+        far = near + np.exp(p[:, 1:2])
+        light = np.exp(p[:, 2:3] + (p[:, 3:4] * is_outer if faces is None else 0.0 * side))
+        light = light if faces is None else light * faces(side, is_outer)
+        edge = np.zeros_like(near)
+        return np.stack([edge, -far, -near], -1), np.stack([edge + 1.0, light, -light], -1)
+
+    return steps
+
+
+def _sheen(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
+    """Light on the finger that fades away from its edge: how far, and its part of the contrast at the edge."""
+    length = np.broadcast_to(np.exp(p[:, :1]), (len(p), side.size))
+    light = _logistic(p[:, 1:2] + p[:, 2:3] * is_outer)
+    shares = np.exp(-EXPONENTIAL)
+    at = np.concatenate([np.zeros((*length.shape, 1)), -length[..., None] * EXPONENTIAL], -1)
+    return at, np.concatenate([1.0 - light[..., None], light[..., None] * (shares / shares.sum())], -1)
 
 
 def _band(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
@@ -106,7 +138,7 @@ def _band(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
     return np.stack([-breadth, np.zeros_like(breadth)], -1), np.stack([light, 1.0 - light], -1)
 
 
-def _hard_shadow(faces: Callable[[Floats, Bools], Floats]) -> Steps:
+def _hard_shadow(faces: Faces) -> Steps:
     """Shadow with a hard edge beside the flanks for which `faces` is not zero: its breadth, its depth as a logit."""
 
     def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
@@ -117,7 +149,7 @@ def _hard_shadow(faces: Callable[[Floats, Bools], Floats]) -> Steps:
     return steps
 
 
-def _mark(faces: Callable[[Floats, Bools], Floats]) -> Steps:
+def _mark(faces: Faces) -> Steps:
     """Another tone on the finger along the flanks for which `faces` is not zero: its breadth, the change of its light.
 
     A pad or tape lies on the inner sides; shading changes with the direction in which a flank faces.
@@ -150,10 +182,13 @@ def _spread(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
     return width[..., None] * (EVEN - 0.5), np.full((*width.shape, EVEN.size), 1.0 / EVEN.size)
 
 
-def _shadow(places: Floats, shares: Floats | None = None, *, is_apart: bool = False) -> Steps:
+def _shadow(
+    places: Floats, shares: Floats | None = None, faces: Faces | None = None, *, is_apart: bool = False
+) -> Steps:
     """Shadow on the ground: its light comes back at these places, equally if not by shares; sides may be unlike.
 
-    It begins at the edge or, of a part high above the ground, some way apart from it.
+    It begins at the edge or, of a part high above the ground, some way apart from it. Where fingers hide much of the
+    light from one another, it lies beside the flanks for which `faces` is not zero.
     """
     parts = np.ones(places.size) if shares is None else shares
     parts = parts / parts.sum()
@@ -161,7 +196,11 @@ def _shadow(places: Floats, shares: Floats | None = None, *, is_apart: bool = Fa
     def steps(p: Floats, side: Floats, is_outer: Bools) -> tuple[Floats, Floats]:
         length = np.broadcast_to(np.exp(p[:, 1:2]), (len(p), side.size))
         # Light from the front casts the same shadow on all sides, light from one side none on its own.
-        share = _logistic(ALL_SIDES + side * p[:, 2:3]) / _logistic(np.array(ALL_SIDES))
+        share = (
+            _logistic(ALL_SIDES + side * p[:, 2:3]) / _logistic(np.array(ALL_SIDES))
+            if faces is None
+            else faces(side, is_outer)
+        )
         depth = _logistic(p[:, :1]) * share
         rest_at = length[..., None] * places + (np.exp(p[:, 3:4, None]) if is_apart else 0.0)
         at = np.concatenate([np.zeros((*length.shape, 1)), rest_at], -1)
@@ -188,9 +227,11 @@ _LINE = (
     (0.7, 0.7, 0.8, 0.5),
     tuple((*_log(near, 1.5, 0.6), 0.0) for near in (0.7, 3.0)),
 )
+_PART_LINE = (_LINE[0][:3], _LINE[1][:3], tuple(start[:3] for start in _LINE[2]))
 _BAND = ((*_log(3.0), 0.0, 0.0), (0.7, 1.2, 0.3), tuple((*_log(width), 0.0, 0.0) for width in (1.5, 4.0)))
 _DEPTH_LENGTH_SIDE = (-1.0, *_log(6.0), 0.0), (1.0, 0.7, 3.0)
 _SHADOW_STARTS = tuple((-1.5, *_log(length), side) for side in (0.0, 5.0, -5.0) for length in (4.0, 10.0))
+_PART_SHADOW = (_DEPTH_LENGTH_SIDE[0][:2], _DEPTH_LENGTH_SIDE[1][:2], tuple(s[:2] for s in _SHADOW_STARTS[:2]))
 _SHADOW = (*_DEPTH_LENGTH_SIDE, _SHADOW_STARTS)
 _SHADOW_APART = (
     (*_DEPTH_LENGTH_SIDE[0], *_log(2.0)),
@@ -206,21 +247,28 @@ _MOTION = (_log(4.0, 4.0), (1.0, 1.0), tuple(_log(way, way) for way in (3.0, 8.0
 
 NOTHING = Scene("", _nothing, (), (), ((),), 0.48)
 # Prior probabilities: one recording in ten shows a wall (thick parts), a shadow, or a bright line (edges that are
-# chamfered or polished); a chamfer that is evenly bright up to the edge on all sides is rare.
+# chamfered or polished); a chamfer that is evenly bright up to the edge on all sides is rare. A line on some flanks
+# alone, from light of one side or on faces that were ground, looks much as the far commoner wall does.
 SCENES = (
-    Scene("wall", _wall(lambda side, is_outer: np.where(is_outer, 0.0, 1.0)), *_INNER_WALL, 0.06, 0.1),
-    Scene("wall", _wall(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02, 0.1),
-    Scene("wall", _wall(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_SIDE_WALL, 0.02, 0.1),
-    Scene("glare", _line, *_LINE, 0.06, 0.35, True),
+    Scene("wall", _wall(_inner), *_INNER_WALL, 0.06, 0.1),
+    Scene("wall", _wall(_rightward), *_SIDE_WALL, 0.02, 0.1),
+    Scene("wall", _wall(_leftward), *_SIDE_WALL, 0.02, 0.1),
+    Scene("glare", _line(), *_LINE, 0.05, 0.35, True),
     Scene("glare", _band, *_BAND, 0.02, 0.35, True),
+    Scene("glare", _sheen, *_BAND, 0.02, 0.35, True),
+    Scene("glare", _line(_inner), *_PART_LINE, 0.002, 0.35),
+    Scene("glare", _line(_rightward), *_PART_LINE, 0.002, 0.35),
+    Scene("glare", _line(_leftward), *_PART_LINE, 0.002, 0.35),
     Scene("shadow", _shadow(EVEN), *_SHADOW, 0.045, 0.1, True),
     Scene("shadow", _shadow(EXPONENTIAL, np.asarray(np.exp(-EXPONENTIAL))), *_SHADOW, 0.045, 0.1, True),
+    Scene("shadow", _shadow(EVEN, None, _inner), *_PART_SHADOW, 0.015, 0.1),
+    Scene("shadow", _shadow(EXPONENTIAL, np.asarray(np.exp(-EXPONENTIAL)), _inner), *_PART_SHADOW, 0.015, 0.1),
     Scene("shadow", _shadow(EVEN, is_apart=True), *_SHADOW_APART, 0.01, 0.1, True),
-    Scene("shadow", _hard_shadow(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_HARD_SHADOW, 0.01, 0.1),
-    Scene("shadow", _hard_shadow(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_HARD_SHADOW, 0.01, 0.1),
-    Scene("", _mark(lambda side, is_outer: np.where(is_outer, 0.0, 1.0)), *_MARK, 0.03),
-    Scene("", _mark(lambda side, is_outer: np.where(side > 0.0, 1.0, 0.0)), *_MARK, 0.02),
-    Scene("", _mark(lambda side, is_outer: np.where(side < 0.0, 1.0, 0.0)), *_MARK, 0.02),
+    Scene("shadow", _hard_shadow(_rightward), *_HARD_SHADOW, 0.01, 0.1),
+    Scene("shadow", _hard_shadow(_leftward), *_HARD_SHADOW, 0.01, 0.1),
+    Scene("", _mark(_inner), *_MARK, 0.03),
+    Scene("", _mark(_rightward), *_MARK, 0.02),
+    Scene("", _mark(_leftward), *_MARK, 0.02),
     Scene("", _motion, *_MOTION, 0.05),
     Scene("", _trail, *_TRAIL, 0.03),
     Scene("", _spread, *_SPREAD, 0.1, is_on_tip=True),
@@ -248,7 +296,8 @@ def pair(first: Scene, second: Scene) -> Scene:
 
 
 # Pairs that are tried where one alone does not explain the edges.
-_INNER, _LINE_ALONE, _BAND_ALONE, _RAMP = SCENES[0], SCENES[3], SCENES[4], SCENES[5]
+_INNER, _LINE_ALONE, _BAND_ALONE = SCENES[0], SCENES[3], SCENES[4]
+_RAMP = next(scene for scene in SCENES if scene.name == "shadow")
 PAIRS = (
     pair(_INNER, _LINE_ALONE),
     pair(_INNER, _BAND_ALONE),

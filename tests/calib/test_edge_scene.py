@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
+from scipy.special import erfc
 
 from calib.edge_profile import EdgeProfile
 from calib.edge_response import probabilities
@@ -49,6 +50,19 @@ def chamfer(t: Floats, is_outer: bool) -> Floats:
     return nothing(t, is_outer) + np.where((t < 0.0) & (t > -2.0), 0.37, 0.0)
 
 
+def polished_inside(t: Floats, is_outer: bool) -> Floats:
+    return nothing(t, is_outer) + np.where((t < -0.8) & (t > -2.3) & (not is_outer), 0.35, 0.0)
+
+
+def sheen(t: Floats, is_outer: bool) -> Floats:
+    """Light of a ring lamp on a rounded edge: it falls off as a Gaussian integral does, not as the model has it."""
+    return nothing(t, is_outer) + np.where(t < 0.0, 0.3 * erfc(-t / 5.0), 0.0)
+
+
+def contact_between(t: Floats, is_outer: bool) -> Floats:
+    return nothing(t, is_outer) if is_outer else contact(t, is_outer)
+
+
 def profiles(light: Callable[[Floats, bool], Floats], at_px: float, rng: np.random.Generator) -> list[EdgeProfile]:
     """Profiles whose zero lies `at_px` inside the edge, as if a step had been fitted there."""
     fine = np.arange(-40.0, 40.0, FINE_PX)
@@ -64,8 +78,26 @@ def profiles(light: Callable[[Floats, bool], Floats], at_px: float, rng: np.rand
 
 @pytest.mark.parametrize(
     ("light", "name"),
-    [(wall, "wall"), (line, "glare"), (shadow, "shadow"), (contact, "shadow"), (wall_and_line, "glare and wall")],
-    ids=["wall", "line", "shadow", "contact shadow", "wall and line"],
+    [
+        (wall, "wall"),
+        (line, "glare"),
+        (polished_inside, "glare"),
+        (sheen, "glare"),
+        (shadow, "shadow"),
+        (contact, "shadow"),
+        (contact_between, "shadow"),
+        (wall_and_line, "glare and wall"),
+    ],
+    ids=[
+        "wall",
+        "line",
+        "line on inner flanks",
+        "sheen",
+        "shadow",
+        "contact shadow",
+        "contact shadow between fingers",
+        "wall and line",
+    ],
 )
 def test_the_edge_is_found_beside_what_displaces_a_step(light: Callable[[Floats, bool], Floats], name: str) -> None:
     rng = np.random.default_rng(21)
