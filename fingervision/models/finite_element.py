@@ -39,7 +39,7 @@ from fingervision.models.mechanism_faces import (
     supports_of,
     with_actuators,
 )
-from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, OutOfPlane, out_of_plane
+from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, OutOfPlane, out_of_plane, share_of_bodies
 from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.reference_mesh import mesh_of
@@ -96,27 +96,33 @@ class MechanismPlate(ElasticMechanism):
         self._size_mm = region.size_mm
         self.mesh: PlaneMesh = mesh or triangulate(region, _ACROSS * refine, _BODY * self._size_mm / refine)
         zones = self._hold_back()
-        middles = self.mesh.nodes_mm[:, self.mesh.triangles[:3]].mean(axis=1)
+        middles = self.plate.middles_mm
         inside = [zone.holds(middles) for zone in zones] or [np.ones(middles.shape[1], dtype=bool)]
         corners_mm = self.plate.nodes_mm[:, self.plate.corner_triangles]
         self._in_flexure = np.any(inside, axis=0) & ~self._beside_sharp_corners(region, corners_mm)
         corners = [] if mechanism.flexures else sharp_corners_mm(region)
         self.unstated_stress_at_mm = (float(corners[0][0]), float(corners[0][1])) if corners else None
         self._support()
-        if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures) and not self._wanders():
+        if width_effect and not self._wanders():
             # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
-            moved, whole = self.driven.unit_displacement, 0.5 * self.driven.input_stiffness_n_mm
-            flexures = (f if f.is_notch else used_in_plate(f, self.plate, moved, whole) for f in mechanism.flexures)
-            self.mechanism = replace(mechanism, flexures=tuple(flexures))
-            del self.driven
-            self._hold_back()
+            moved = self.driven.unit_displacement
+            whole = float(self.plate.energies_n_mm(moved).sum())
+            flexures = tuple(
+                f if f.is_notch else used_in_plate(f, self.plate, moved, whole) for f in mechanism.flexures
+            )
+            bodies = share_of_bodies(self.plate, mechanism, moved, whole, self._errors[0])
+            if (flexures, bodies) != (mechanism.flexures, mechanism.bodies_share):
+                self.mechanism = replace(mechanism, flexures=flexures, bodies_share=bodies)
+                del self.driven
+                self._hold_back()
 
     def _hold_back(self) -> tuple[ConstrainedZone, ...]:
         """Make the plate with its flexures stiffened by the restraint of its width; equal halves are one plate."""
         mechanism = self.mechanism
         zones = tuple(flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures)
-        used, thick_mm = zones if self._width_effect else (), mechanism.halves * mechanism.plate_mm
-        self.plate = PlaneStressPlate(self.mesh, mechanism.material, thick_mm, used)
+        used, bodies = (zones, mechanism.bodies_share or 0.0) if self._width_effect else ((), 0.0)
+        thick_mm = mechanism.halves * mechanism.plate_mm
+        self.plate = PlaneStressPlate(self.mesh, mechanism.material, thick_mm, used, elsewhere=bodies)
         return zones
 
     def _beside_sharp_corners(self, region: PlanarRegion, points: Array) -> NDArray[np.bool_]:
