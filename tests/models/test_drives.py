@@ -286,7 +286,8 @@ flexure = [{ name = "h", kind = "leaf", at_mm = [21, 0], axis_deg = 0, thickness
     (tmp_path / "beam.toml").write_text(text)
     mechanism = read_mechanism(tmp_path / "beam.toml")
     for kind in (MechanismFrame, MechanismPlate):
-        assert kind(mechanism).stiffness_n_mm == pytest.approx(3.0 * 70000.0 * 5.0 / 12.0 / 19.5**3, rel=0.02)
+        plane = kind(mechanism, width_effect=False)
+        assert plane.stiffness_n_mm == pytest.approx(3.0 * 70000.0 * 5.0 / 12.0 / 19.5**3, rel=0.02)
 
 
 HELD = """
