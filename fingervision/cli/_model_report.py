@@ -121,9 +121,9 @@ def warn(
     """Warn of yielding, buckling, necks that are no flexures, and faces that penetrate each other."""
     if (corner := getattr(model, "unstated_stress_at_mm", None)) is not None:
         click.echo(
-            f"Warning: the stress is not stated, because the outline has a re-entrant corner without a radius at "
-            f"({corner[0]:.4g}, {corner[1]:.4g}) mm, where it has no limit: round the corner, or draw the thin strip "
-            "there as a [[flexure]].",
+            "Warning: the stress is not stated, because the outline has a re-entrant corner without a radius, or a "
+            f"face ends, at ({corner[0]:.4g}, {corner[1]:.4g}) mm, where it has no limit: round the corner, let the "
+            "face turn, or draw the thin strip there as a [[flexure]].",
             err=True,
         )
     necks = [

@@ -40,7 +40,7 @@ from fingervision.models.mechanism_faces import (
     with_actuators,
 )
 from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, OutOfPlane, out_of_plane, share_of_bodies
-from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
+from fingervision.models.planar_region import PlanarRegion, face_ends_mm, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.reference_mesh import mesh_of
 from fingervision.models.triangulate import PlaneMesh, triangulate
@@ -55,6 +55,9 @@ _ACROSS, _BODY = 4.0, 0.025
 _STRESS_ERROR = 0.01
 """Relative error of the stress; meshes twice and three times as fine differ by 0.3 %
 (`tests/benchmarks/models_held_out.py`)."""
+_BESIDE_END = 0.03
+"""Distance from the end of a face, over the body's size, within which the largest stress is that of the end, where it
+has no limit: with a clamp or a held drive there it was twice that of wedge elements of CalculiX."""
 _BUCKLING = 4
 """Number of buckling inputs nearest to rest that are sought on both sides together."""
 
@@ -115,6 +118,10 @@ class MechanismPlate(ElasticMechanism):
                 self.mechanism = replace(mechanism, flexures=flexures, bodies_share=bodies)
                 del self.driven
                 self._hold_back()
+            if not flexures and self.unstated_stress_at_mm is None:
+                at_mm = self.peak_stress(moved).place_mm
+                ends = [end for end in face_ends_mm(region) if np.hypot(*(end - at_mm)) < _BESIDE_END * self._size_mm]
+                self.unstated_stress_at_mm = at_mm if ends else None
 
     def _hold_back(self) -> tuple[ConstrainedZone, ...]:
         """Make the plate with its flexures stiffened by the restraint of its width; equal halves are one plate."""
@@ -263,8 +270,8 @@ class MechanismPlate(ElasticMechanism):
     def peak_stress(self, moved: Array, *, large: bool = False) -> LargestStress:
         """Largest von Mises stress in the flexures at given displacements.
 
-        It is not a number in a drawing without flexures that has a re-entrant corner without a radius
-        (`unstated_stress_at_mm`): the stress has no limit there.
+        It is not a number in a drawing without flexures that has a re-entrant corner without a radius, or whose stress
+        is largest at the end of a face (`unstated_stress_at_mm`): the stress has no limit there.
         """
         if self.unstated_stress_at_mm is not None:
             return LargestStress(nan, self.unstated_stress_at_mm)

@@ -271,11 +271,14 @@ class Mechanism:
     @property
     def mode_error(self) -> float:
         """Relative uncertainty of frequencies, because modes may load the strips otherwise than the input does."""
-        ranges = [flexure.width_range(self.plate_mm) for flexure in self.flexures]
-        if self.bodies_share is not None:
-            ranges.append(max(self.bodies_share, 1.0 - self.bodies_share))
-        apart = max(ranges, default=0.0)
-        return 0.5 * self.material.poisson_ratio**2 * apart
+        apart = max((flexure.width_range(self.plate_mm) for flexure in self.flexures), default=0.0)
+        return max(0.5 * self.material.poisson_ratio**2 * apart, self.bodies_error)
+
+    @property
+    def bodies_error(self) -> float:
+        """Relative uncertainty of motions and frequencies, because bodies are held by one weight wherever they bend."""
+        share = self.bodies_share
+        return 0.0 if share is None else 0.5 * self.material.poisson_ratio**2 * max(share, 1.0 - share)
 
     @property
     def joints(self) -> tuple[Joint, ...]:

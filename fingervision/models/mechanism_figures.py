@@ -253,7 +253,7 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     """
     figures = response_figures(model)
     errors = {
-        "model_error_motion_percent": 100.0 * _MOTION_ERROR * model.force_error,
+        "model_error_motion_percent": 100.0 * (_MOTION_ERROR * model.force_error + model.mechanism.bodies_error),
         "model_error_force_percent": 100.0 * model.force_error,
     }
     if "mode_1_drive_free_hz" in figures:
