@@ -13,7 +13,7 @@ from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
 from fingervision.models.layers import Joint, Sheet, pieces_of, points_in
-from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
+from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_shapes import Shape, box, crossings
 from fingervision.models.width_effect import force_uncertainty
 
@@ -22,8 +22,6 @@ SIZES_MM = (0.3, 5000.0)
 _OVER_DEPTH = 0.02
 """Variation of the stress over the plate's depth beside that by restraint, from wedge elements of CalculiX
 (`tests/benchmarks/models_three_dimensions.py`)."""
-_AT_CORNER = 1.01
-"""Size, over that of a flexure, of the rectangle in which corners belong to it."""
 _MOST_NAMED = 3
 """Pieces of a drawing that a message names."""
 _BETWEEN_ROOTS = 0.8
@@ -202,8 +200,6 @@ class Mechanism:
         as the plate, and parts of different layers are joined only by bodies that lie in both.
     notes : tuple of str
         Sentences on how the drawing was read.
-    bodies_share : float or None
-        Weight of plane strain in the bodies beside the flexures; None where they bend too little for it to matter.
     mirrored : bool
         Whether bodies, flexures and faces are the right half of a mechanism whose left half is its mirror image in the
         line x = 0. Forces of drives are those of both halves; a probe with x < 0 lies on the left half.
@@ -225,7 +221,6 @@ class Mechanism:
     mirrored: bool = False
     layers: tuple[tuple[int, ...], ...] = ()
     notes: tuple[str, ...] = ()
-    bodies_share: float | None = None
 
     @property
     def halves(self) -> float:
@@ -246,13 +241,6 @@ class Mechanism:
         return tuple(flexure for flexure in self.flexures if flexure.found)
 
     @property
-    def sharp_ends(self) -> list[str]:
-        """Names of the leaves and strips at an end of which the outline has a corner without a radius."""
-        corners = np.reshape(sharp_corners_mm(self.region), (-1, 2)).T
-        zones = [(flexure, flexure.zone(self.plate_mm)) for flexure in self.flexures if not flexure.is_notch]
-        return [flexure.name for flexure, zone in zones if zone.grown(_AT_CORNER).holds(corners).any()]
-
-    @property
     def width_error(self) -> float:
         """Relative uncertainty of the force because the restraint of the flexures by the plate's width is uncertain."""
         doubt = max((flexure.width_doubt(self.plate_mm) for flexure in self.flexures), default=0.0)
@@ -264,21 +252,14 @@ class Mechanism:
 
         Where it is largest, the restraint by the width may be absent that makes the von Mises stress smaller.
         """
-        held = (*(flexure.zone(self.plate_mm).stressed for flexure in self.flexures), self.bodies_share or 0.0)
-        across = self.material.poisson_ratio * max(held)
+        across = self.material.poisson_ratio * max((f.zone(self.plate_mm).stressed for f in self.flexures), default=0.0)
         return _OVER_DEPTH + 1.0 - sqrt(1.0 - across + across**2)
 
     @property
     def mode_error(self) -> float:
         """Relative uncertainty of frequencies, because modes may load the strips otherwise than the input does."""
         apart = max((flexure.width_range(self.plate_mm) for flexure in self.flexures), default=0.0)
-        return max(0.5 * self.material.poisson_ratio**2 * apart, self.bodies_error)
-
-    @property
-    def bodies_error(self) -> float:
-        """Relative uncertainty of motions and frequencies, because bodies are held by one weight wherever they bend."""
-        share = self.bodies_share
-        return 0.0 if share is None else 0.5 * self.material.poisson_ratio**2 * max(share, 1.0 - share)
+        return 0.5 * self.material.poisson_ratio**2 * apart
 
     @property
     def joints(self) -> tuple[Joint, ...]:

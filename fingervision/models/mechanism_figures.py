@@ -253,7 +253,7 @@ def mechanism_figures(model: MechanismModel) -> dict[str, float]:
     """
     figures = response_figures(model)
     errors = {
-        "model_error_motion_percent": 100.0 * (_MOTION_ERROR * model.force_error + model.mechanism.bodies_error),
+        "model_error_motion_percent": 100.0 * _MOTION_ERROR * model.force_error,
         "model_error_force_percent": 100.0 * model.force_error,
     }
     if "mode_1_drive_free_hz" in figures:
@@ -280,8 +280,7 @@ def width_effect(model: ElasticMechanism) -> dict[str, float]:
 
     It is left out of `mechanism_figures`, because it takes a second model, and sweeps compute many drawings.
     """
-    is_held = model.mechanism.flexures or model.mechanism.bodies_share
-    if not is_held or np.any(model.driven.rest_mm) or (plane := model.in_plane_stress) is None:
+    if not model.mechanism.flexures or np.any(model.driven.rest_mm) or (plane := model.in_plane_stress) is None:
         return {}
     return {"width_effect_force_percent": 100.0 * (model.stiffness_n_mm / plane.stiffness_n_mm - 1.0)}
 

@@ -1,8 +1,7 @@
-"""Three-dimensional elements of a plate: motion out of its plane with the drive fixed, and bodies held by their width.
+"""Out-of-plane motion of a mechanism with its drive fixed: natural modes, and the sag of a horizontal plate.
 
-Motion out of the plane has natural modes, and the sag of a horizontal plate. Fixed faces and driven faces are then
-fixed in all directions. A sliding face is fixed in its constrained direction at every depth, which on a plane of
-symmetry selects the symmetric modes.
+Fixed faces and driven faces are fixed in all directions. A sliding face is fixed in its constrained direction at
+every depth, which on a plane of symmetry selects the symmetric modes.
 """
 
 from collections.abc import Mapping
@@ -30,11 +29,10 @@ from fingervision.models.triangulate import PlaneMesh, triangulate
 # Displacements are u_i(x, y, z) = sum N_a(x, y) P_k(2 z / b) q_iak with shape functions N_a, depth b, unknowns q and
 # Legendre polynomials P_k: odd polynomials for the in-plane components, even polynomials for the out-of-plane
 # component. Odd and even polynomials together describe bending, torsion and shear of a plate that is symmetric about
-# its middle plane; with even polynomials in the plane and odd ones out of it, they describe motion in the plane, in
-# which the plate becomes thinner and thicker. The solution converges to three-dimensional elasticity as the order
-# grows (hierarchic plate models: Babuska and Li, 1992, Computer Methods in Applied Mechanics and Engineering 100, 249),
-# without the assumptions of plate or beam theory. Torsion of a deep neck therefore includes restrained warping, and
-# bodies bend right up to their junctions.
+# its middle plane. The solution converges to three-dimensional elasticity as the order grows (hierarchic plate models:
+# Babuska and Li, 1992, Computer Methods in Applied Mechanics and Engineering 100, 249), without the assumptions of
+# plate or beam theory. Torsion of a deep neck therefore includes restrained warping, and bodies bend right up to their
+# junctions.
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -58,30 +56,16 @@ class DeepPlate:
     plate_mm : float
         Depth of the plate (out of the plane).
     order : int
-        Largest order of the polynomials through the depth, an odd one.
-    in_plane : bool
-        Whether the plate moves in its plane instead.
-    triangles : ndarray of int, or None
-        Triangles of the mesh that are part of the plate; None for all.
+        Odd order of the polynomials through the depth for the in-plane components.
     """
 
-    def __init__(
-        self,
-        mesh: PlaneMesh,
-        material: Material,
-        plate_mm: float,
-        order: int = _ORDER,
-        *,
-        in_plane: bool = False,
-        triangles: Indices | None = None,
-    ) -> None:
+    def __init__(self, mesh: PlaneMesh, material: Material, plate_mm: float, order: int = _ORDER) -> None:
         self.material, self.plate_mm = material, plate_mm
-        whole = skfem.MeshTri2(mesh.nodes_mm, mesh.triangles)
-        self._basis = skfem.Basis(whole, skfem.ElementTriP2(), elements=triangles, intorder=4)
+        self._basis = skfem.Basis(skfem.MeshTri2(mesh.nodes_mm, mesh.triangles), skfem.ElementTriP2(), intorder=4)
         self.nodes_mm: Array = self._basis.doflocs
         odd = [np.eye(order + 1)[k] for k in range(1, order + 1, 2)]
         even = [np.eye(order + 1)[k] for k in range(0, order, 2)]
-        self._shapes = (even, even, odd) if in_plane else (odd, odd, even)
+        self._shapes = odd, odd, even
 
     @property
     def unknowns(self) -> int:
@@ -154,26 +138,6 @@ class DeepPlate:
         nodes, weights = element_weights(self.nodes_mm, self._basis.element_dofs, point)
         values = moved[self.coefficients(nodes, 2)].reshape(nodes.size, -1) @ _even_at_middle(len(self._shapes[2]))
         return float(weights @ values)
-
-    def relaxed_energy_n_mm(self, means_mm: tuple[Array, Array], nodes: Indices, guided: Indices) -> float:
-        """Strain energy of the equilibrium at prescribed displacements in the plane.
-
-        Parameters
-        ----------
-        means_mm : (ndarray, ndarray)
-            Displacements of all nodes along x and y, uniform over the depth.
-        nodes, guided : ndarray of int
-            Nodes that are free to move, some of them guided: their means over the depth stay as given.
-        """
-        moved = np.zeros(self.unknowns)
-        every = np.arange(self.nodes_mm.shape[1])
-        for way, values in enumerate(means_mm):
-            moved[self.coefficients(every, way)[:: len(self._shapes[way])]] = values
-        kept = [self.coefficients(guided, way)[:: len(self._shapes[way])] for way in range(2)]
-        free = np.setdiff1d(np.concatenate([self.coefficients(nodes, way) for way in range(3)]), np.concatenate(kept))
-        loads = self.stiffness_n_mm @ moved
-        relaxed = factorised(self.stiffness_n_mm[free][:, free]).solve(loads[free])
-        return float(0.5 * (moved @ loads - loads[free] @ relaxed))
 
     def supported(self, held: Indices) -> "SupportedPlate":
         """Return the plate with the given coefficients fixed to zero."""
@@ -282,67 +246,3 @@ def out_of_plane(
         for name, (x, y) in mechanism.probes.items()
     }
     return OutOfPlane(body.modes_hz(count), sag_mm)
-
-
-_ORDER_OF_BODIES = 5
-"""Order of the polynomials through the depth for bodies that bend in the plane: a notch 16 times as wide as thick is
-0.3 % stiffer than with order 7, which has the stiffness of the tables for hinges."""
-_MOST_OF_THEM = 0.999
-"""Share of the bodies' strain energy that is computed in three dimensions: the parts that bend least come last, and
-they hold the width of those that bend more."""
-
-
-def share_of_bodies(
-    plate: PlaneStressPlate, mechanism: Mechanism, moved: Array, whole_n_mm: float, error: float
-) -> float | None:
-    """Weight of plane strain in what bends beside the flexures: parts of bodies that no theory of flexures describes.
-
-    A thin part that is no straight strip and no symmetric notch (a curved spring, a neck between unlike arcs or at a
-    hole) is held by its width as flexures are. Three-dimensional elements give its strain energy where the rest of the
-    plate moves as in plane stress.
-
-    Parameters
-    ----------
-    plate : PlaneStressPlate
-        The bodies, in plane stress beside the flexures.
-    mechanism : Mechanism
-        The drawing.
-    moved : ndarray of float
-        Displacements of the plate per input.
-    whole_n_mm : float
-        Strain energy of the whole mechanism at these displacements.
-    error : float
-        Relative error of the force that is stated anyway.
-
-    Returns
-    -------
-    float or None
-        The weight, 0 to 1; None where the width changes the force by less than the error.
-    """
-    if mechanism.bodies_share is not None:
-        return mechanism.bodies_share
-    poisson_squared = mechanism.material.poisson_ratio**2
-    energies = plate.energies_n_mm(moved)
-    for flexure in mechanism.flexures:
-        energies[flexure.zone(mechanism.plate_mm).holds(plate.middles_mm)] = 0.0
-    if mechanism.layers or poisson_squared * energies.sum() <= error * whole_n_mm:
-        return None
-    order = np.argsort(energies)[::-1]
-    most = int(np.searchsorted(np.cumsum(energies[order]), _MOST_OF_THEM * energies.sum())) + 1
-    bent = np.sort(order[:most])
-    supports = supports_of(plate, mechanism, mechanism.region.size_mm)
-    still = [plate.nodes_of_triangles[:, order[most:]].ravel(), *supports.fixed]
-    guided = [*supports.driven, *(nodes for nodes, _ in supports.slides)]
-    inner = np.setdiff1d(plate.nodes_of_triangles[:, bent], np.concatenate(still))
-    deep = DeepPlate(
-        plate.mesh,
-        mechanism.material,
-        plate.plate_mm / mechanism.halves,
-        _ORDER_OF_BODIES,
-        in_plane=True,
-        triangles=bent,
-    )
-    solid = mechanism.halves * deep.relaxed_energy_n_mm(
-        (moved[plate.x_dofs], moved[plate.y_dofs]), inner, np.intersect1d(inner, np.concatenate(guided))
-    )
-    return float(np.clip((1.0 - energies[bent].sum() / solid) / poisson_squared, 0.0, 1.0))

@@ -6,8 +6,7 @@ short compared with its width is therefore stiffer than in plane stress, by a fa
 strain (nu: Poisson's ratio). The weight w of plane strain (0 to 1) comes from brick elements (`hinge_correction`).
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import cos, radians, sin
 
 import numpy as np
@@ -47,11 +46,6 @@ class ConstrainedZone:
     share: float
     stressed: float
 
-    def grown(self, factor: float) -> "ConstrainedZone":
-        """The zone with both extents multiplied by a factor."""
-        length, height = factor * self.half_length_mm, factor * self.half_height_mm
-        return replace(self, half_length_mm=length, half_height_mm=height)
-
     def holds(self, points: Array) -> NDArray[np.bool_]:
         """Whether points, shape (2, n), lie in the zone."""
         c, s = cos(radians(self.axis_deg)), sin(radians(self.axis_deg))
@@ -61,14 +55,12 @@ class ConstrainedZone:
         )
 
 
-def shares_at(zones: Sequence[ConstrainedZone], points: Array, elsewhere: float = 0.0) -> Array:
-    """Shares of plane strain in stiffness and stress at given points, shape (2, n); `elsewhere` outside the zones."""
-    shares = np.full((2, points.shape[1]), elsewhere)
-    inside = np.zeros(points.shape[1], dtype=bool)
+def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:
+    """Shares of plane strain in stiffness and stress at given points, shape (2, n); 0 outside the zones."""
+    shares = np.zeros((2, points.shape[1]))
     for zone in zones:
-        own, here = np.array([[zone.share], [zone.stressed]]), zone.holds(points)
-        shares = np.where(here, np.where(inside, np.maximum(shares, own), own), shares)
-        inside |= here
+        own = np.array([[zone.share], [zone.stressed]])
+        shares = np.where(zone.holds(points), np.maximum(shares, own), shares)
     return shares
 
 

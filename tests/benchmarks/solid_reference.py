@@ -230,12 +230,12 @@ def _equations(driven: Drive, body: Wedges, nodes: Indices, along: int, free: in
 
 
 def _peak(mechanism: Mechanism, body: Wedges, mises_mpa: Array) -> float:
-    """Largest stress in the flexures, or anywhere without flexures, half a thickness away from sharp corners."""
+    """Largest stress in the flexures, without what is within half a thickness of sharp corners."""
     points = body.nodes_mm[:, :2].T
-    near_mm = 0.5 * min((flexure.thickness_mm for flexure in mechanism.flexures), default=0.0)
+    near_mm = 0.5 * min(flexure.thickness_mm for flexure in mechanism.flexures)
     zones = [flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures]
     zones = [replace(zone, half_height_mm=zone.half_height_mm + _ON * near_mm) for zone in zones]
-    inside = np.any([zone.holds(points) for zone in zones] or [np.ones(points.shape[1], dtype=bool)], axis=0)
+    inside = np.any([zone.holds(points) for zone in zones], axis=0)
     for corner in sharp_corners_mm(mechanism.region):
         inside &= np.hypot(points[0] - corner[0], points[1] - corner[1]) >= near_mm
     return float(mises_mpa[inside].max())
