@@ -66,8 +66,9 @@ def minutes_left(folder: Path, seconds: float) -> float | None:
 FRAMES_WAITING = 250
 # With more waiting frames than this number, the preview is slowed down.
 FRAMES_UNTIL_HURRY = 12
-# Longest time without a frame that is written or measured, after the recording is stopped.
-PATIENCE_S = 30.0
+# Longest time without a frame that is written or measured, after the recording is stopped; and until the first is
+# measured, because the camera is learnt before, which takes a minute beside programs that take the processor.
+PATIENCE_S, LEARNING_S, LOOK_EVERY_S = 30.0, 300.0, 0.1
 DISK_EVERY_S = 1.0
 # A thread that writes is limited by the processor if it used or awaited one during at least this share of the time. If
 # not, its waits are those for the disk, unless all threads together needed this share of one processor, which only one
@@ -138,11 +139,14 @@ class Recorder:
 
     def join(self) -> None:
         """Wait until everything is written that was recorded before the end, and measured, as long as it goes on."""
-        done: tuple[int, int] | None = None
-        while self._thread.is_alive() and done != (done := (self.run.frames, self.run.measured)):
-            self._thread.join(PATIENCE_S)
-        if self._thread.is_alive():
-            self.fail(self._too_slow())
+        done, since_s = (-1, -1), monotonic()
+        while self._thread.is_alive():
+            self._thread.join(LOOK_EVERY_S)
+            if done != (now := (self.run.frames, self.run.measured)):
+                done, since_s = now, monotonic()
+            if monotonic() - since_s > (PATIENCE_S if self.run.measured else LEARNING_S):
+                self.fail(self._too_slow())
+                return
 
     def _too_slow(self) -> str:
         """State whether the disk or the processor was the bottleneck since frames have had to wait."""

@@ -180,10 +180,13 @@ def test_what_waits_when_a_recording_stops_is_finished_as_long_as_it_goes_on(
     *, goes_on: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recorder_module, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(recorder_module, "LEARNING_S", 5.0)
     run = SimpleNamespace(path=tmp_path, is_there=True, frames=0, measured=0, event=lambda *_: None)
 
     def measure(_: str) -> None:
-        for _ in range(10):
+        time.sleep(1.0)  # the camera is learnt
+        run.measured = 1
+        for _ in range(9):
             time.sleep(0.2)
             run.measured += goes_on
 
