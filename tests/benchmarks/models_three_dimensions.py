@@ -20,7 +20,6 @@ from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import mechanism_figures
 from fingervision.models.out_of_plane import out_of_plane
-from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.triangulate import triangulate
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import read_drawing
@@ -105,12 +104,6 @@ def _percent(ours: float, solid: float) -> str:
     return f"{100.0 * (ours / solid - 1.0):+7.3f}"
 
 
-def _marked(mechanism: Mechanism) -> PlanarRegion:
-    """The body with nodes at its probes."""
-    region = mechanism.region
-    return PlanarRegion(region.steps, (*region.marks_mm, *mechanism.probes.values()))
-
-
 def both_ways(asked: Namespace) -> None:
     """Print, for each mechanism and way of driving, the differences in % and the stated errors."""
     print("drawing, face: model | motion | force | stress | modes with free and held drive; each difference (stated)")
@@ -119,7 +112,7 @@ def both_ways(asked: Namespace) -> None:
         if asked.only is not None and place not in asked.only:
             continue
         drawing = read_drawing(path).mechanism()
-        mesh = triangulate(_marked(drawing), ACROSS * asked.finer, FINER[1] * drawing.region.size_mm / asked.finer)
+        mesh = triangulate(drawing.region, ACROSS * asked.finer, FINER[1] * drawing.region.size_mm / asked.finer)
         for turns in ("free", "held"):
             mechanism = replace(drawing, drives=tuple(replace(drive, turns=turns) for drive in drawing.drives))
             began = time.perf_counter()
@@ -177,7 +170,7 @@ def main(asked: Namespace) -> None:
             continue
         region = mechanism.region
         began = time.perf_counter()
-        mesh = triangulate(_marked(mechanism), FINER[0], FINER[1] * region.size_mm)
+        mesh = triangulate(region, FINER[0], FINER[1] * region.size_mm)
         solid = solid_answer(mechanism, mesh, layers=asked.layers)
         seconds = time.perf_counter() - began
         flat, lifted = solid.modes_hz["held"][0], solid.modes_hz["out"][0]

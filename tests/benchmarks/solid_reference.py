@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fingervision.models.mechanism import Drive, Face, Mechanism
 from fingervision.models.planar_region import sharp_corners_mm
+from fingervision.models.plane_stress import element_weights
 from fingervision.models.triangulate import PlaneMesh
 
 Array = NDArray[np.float64]
@@ -34,7 +35,7 @@ class SolidAnswer:
     force_n : float
         Force at the drive.
     probes_mm : dict of str to (float, float)
-        Motion of each probe, at the nearest node of the middle plane.
+        Motion of each probe, in the element of the middle plane in which it lies.
     stress_mpa : float
         Largest von Mises stress in the flexures at any depth, without what is within half a thickness of sharp corners.
     modes_hz : dict of str to tuple of float
@@ -155,8 +156,8 @@ def solid_answer(
     if len(mechanism.drives) > 1:
         raise ValueError("several drives are checked by their energy: tests/models/test_several_drives.py")
     body = Wedges(mesh, mechanism.plate_mm, layers)
-    watched = {name: int(body.middle[_nearest(mesh, point)]) for name, point in mechanism.probes.items()}
-    sets = _sets(mechanism, body) | {"WATCHED": np.array(sorted(set(watched.values())))}
+    watched = {name: element_weights(mesh.nodes_mm, mesh.triangles, at) for name, at in mechanism.probes.items()}
+    sets = _sets(mechanism, body) | {"WATCHED": body.middle[np.unique([nodes for nodes, _ in watched.values()])]}
     driven = mechanism.drives[0]
     along = 1 if driven.direction[0] != 0.0 else 2
     axes = [1 + "xy".index(component) for _, component in mechanism.slides]
@@ -191,7 +192,11 @@ def solid_answer(
         moved, force = _static(_run(folder, "static", [*lines, *in_plane, *static, "*END STEP"]), -2.0 * sign, along)
         stress = _peak(mechanism, body, _nodal_stress(folder / "static.frd", len(body.nodes_mm)))
         found = {kind: _frequencies(_run(folder, kind, [*lines, *still[kind], *vibrating])) for kind in modes}
-    return SolidAnswer(force, {name: moved[node] for name, node in watched.items()}, stress, found)
+    probes: dict[str, tuple[float, float]] = {}
+    for name, (nodes, weights) in watched.items():
+        x, y = weights @ np.array([moved[node] for node in body.middle[nodes].tolist()])
+        probes[name] = (float(x), float(y))
+    return SolidAnswer(force, probes, stress, found)
 
 
 def _sets(mechanism: Mechanism, body: Wedges) -> dict[str, Indices]:
@@ -230,20 +235,15 @@ def _equations(driven: Drive, body: Wedges, nodes: Indices, along: int, free: in
 
 
 def _peak(mechanism: Mechanism, body: Wedges, mises_mpa: Array) -> float:
-    """Largest stress in the flexures, without what is within half a thickness of sharp corners."""
+    """Largest stress in the flexures, or anywhere without flexures, half a thickness away from sharp corners."""
     points = body.nodes_mm[:, :2].T
-    near_mm = 0.5 * min(flexure.thickness_mm for flexure in mechanism.flexures)
+    near_mm = 0.5 * min((flexure.thickness_mm for flexure in mechanism.flexures), default=0.0)
     zones = [flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures]
     zones = [replace(zone, half_height_mm=zone.half_height_mm + _ON * near_mm) for zone in zones]
-    inside = np.any([zone.holds(points) for zone in zones], axis=0)
+    inside = np.any([zone.holds(points) for zone in zones] or [np.ones(points.shape[1], dtype=bool)], axis=0)
     for corner in sharp_corners_mm(mechanism.region):
         inside &= np.hypot(points[0] - corner[0], points[1] - corner[1]) >= near_mm
     return float(mises_mpa[inside].max())
-
-
-def _nearest(mesh: PlaneMesh, point: tuple[float, float]) -> int:
-    x, y = mesh.nodes_mm
-    return int(np.argmin(np.hypot(x - point[0], y - point[1])))
 
 
 def _run(folder: Path, job: str, lines: list[str]) -> str:
