@@ -63,6 +63,7 @@ def _warn_of_stress(gripper: Gripper, model: Any, inputs: NDArray[np.float64]) -
 
 
 _MOST_NECKS = 3
+_LEAST_PERCENT = 0.05
 
 
 def say_refusals(refusals: Mapping[str, FingervisionError]) -> None:
@@ -90,6 +91,11 @@ def say_drawing(mechanism: Mechanism, figures: Mapping[str, float]) -> None:
             f"The layers {', '.join(map(str, mechanism.by_layer))}, each {mechanism.plate_mm:g} mm thick, are joined "
             f"only by {', '.join(names)}."
         )
+    if (ends := mechanism.sharp_ends) and "peak_stress_mpa_per_mm" in figures:
+        click.echo(
+            f"Stress within half a thickness of the corners without a radius at {', '.join(ends[:_MOST_NECKS])} is "
+            "left out, because it has no limit there: round them for a stress that holds."
+        )
     for drive in mechanism.drives:
         click.echo(drive.words)
     say_width(mechanism.plate_mm, figures)
@@ -97,7 +103,7 @@ def say_drawing(mechanism: Mechanism, figures: Mapping[str, float]) -> None:
 
 def say_width(plate_mm: float, figures: Mapping[str, float | None]) -> None:
     """Print by how much the plate's width raises the force."""
-    if percent := figures.get("width_effect_force_percent"):
+    if (percent := figures.get("width_effect_force_percent") or 0.0) >= _LEAST_PERCENT:
         click.echo(
             f"The plate's width of {plate_mm:g} mm restrains the flexures, which makes the force "
             f"{percent:.2g} % higher than beam formulas with Young's modulus (plane stress)."
@@ -115,9 +121,9 @@ def warn(
     """Warn of yielding, buckling, necks that are no flexures, and faces that penetrate each other."""
     if (corner := getattr(model, "unstated_stress_at_mm", None)) is not None:
         click.echo(
-            f"Warning: the stress is not stated, because the outline has a re-entrant corner without a radius at "
-            f"({corner[0]:.4g}, {corner[1]:.4g}) mm, where it has no limit: round the corner, or draw the thin strip "
-            "there as a [[flexure]].",
+            "Warning: the stress is not stated, because the outline has a re-entrant corner without a radius, or a "
+            f"face ends, at ({corner[0]:.4g}, {corner[1]:.4g}) mm, where it has no limit: round the corner, let the "
+            "face turn, or draw the thin strip there as a [[flexure]].",
             err=True,
         )
     necks = [

@@ -39,8 +39,8 @@ from fingervision.models.mechanism_faces import (
     supports_of,
     with_actuators,
 )
-from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, OutOfPlane, out_of_plane
-from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
+from fingervision.models.out_of_plane import MODE_ERROR, SAG_ERROR, OutOfPlane, held_bodies, out_of_plane
+from fingervision.models.planar_region import PlanarRegion, face_ends_mm, sharp_corners_mm
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.reference_mesh import mesh_of
 from fingervision.models.triangulate import PlaneMesh, triangulate
@@ -55,6 +55,9 @@ _ACROSS, _BODY = 4.0, 0.025
 _STRESS_ERROR = 0.01
 """Relative error of the stress; meshes twice and three times as fine differ by 0.3 %
 (`tests/benchmarks/models_held_out.py`)."""
+_BESIDE_END = 0.03
+"""Distance from the end of a face, over the body's size, within which the largest stress is that of the end, where it
+has no limit: with a clamp or a held drive there it was twice that of wedge elements of CalculiX."""
 _BUCKLING = 4
 """Number of buckling inputs nearest to rest that are sought on both sides together."""
 
@@ -96,27 +99,37 @@ class MechanismPlate(ElasticMechanism):
         self._size_mm = region.size_mm
         self.mesh: PlaneMesh = mesh or triangulate(region, _ACROSS * refine, _BODY * self._size_mm / refine)
         zones = self._hold_back()
-        middles = self.mesh.nodes_mm[:, self.mesh.triangles[:3]].mean(axis=1)
+        middles = self.plate.middles_mm
         inside = [zone.holds(middles) for zone in zones] or [np.ones(middles.shape[1], dtype=bool)]
         corners_mm = self.plate.nodes_mm[:, self.plate.corner_triangles]
         self._in_flexure = np.any(inside, axis=0) & ~self._beside_sharp_corners(region, corners_mm)
         corners = [] if mechanism.flexures else sharp_corners_mm(region)
         self.unstated_stress_at_mm = (float(corners[0][0]), float(corners[0][1])) if corners else None
         self._support()
-        if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures) and not self._wanders():
+        if width_effect and mechanism.drives and not self._wanders():
             # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
-            moved, whole = self.driven.unit_displacement, 0.5 * self.driven.input_stiffness_n_mm
-            flexures = (f if f.is_notch else used_in_plate(f, self.plate, moved, whole) for f in mechanism.flexures)
-            self.mechanism = replace(mechanism, flexures=tuple(flexures))
-            del self.driven
-            self._hold_back()
+            moved = self.driven.unit_displacement
+            whole = float(self.plate.energies_n_mm(moved).sum())
+            flexures = tuple(
+                f if f.is_notch else used_in_plate(f, self.plate, moved, whole) for f in mechanism.flexures
+            )
+            bodies = held_bodies(self.plate, mechanism, moved, whole, self._errors[0])
+            if (flexures, bodies) != (mechanism.flexures, mechanism.held_bodies):
+                self.mechanism = replace(mechanism, flexures=flexures, held_bodies=bodies)
+                del self.driven
+                self._hold_back()
+            if not flexures and self.unstated_stress_at_mm is None:
+                at_mm = self.peak_stress(moved).place_mm
+                ends = [end for end in face_ends_mm(region) if np.hypot(*(end - at_mm)) < _BESIDE_END * self._size_mm]
+                self.unstated_stress_at_mm = at_mm if ends else None
 
     def _hold_back(self) -> tuple[ConstrainedZone, ...]:
         """Make the plate with its flexures stiffened by the restraint of its width; equal halves are one plate."""
         mechanism = self.mechanism
         zones = tuple(flexure.zone(mechanism.plate_mm) for flexure in mechanism.flexures)
-        used, thick_mm = zones if self._width_effect else (), mechanism.halves * mechanism.plate_mm
-        self.plate = PlaneStressPlate(self.mesh, mechanism.material, thick_mm, used)
+        used, bodies = (zones, mechanism.held_bodies) if self._width_effect else ((), None)
+        thick_mm = mechanism.halves * mechanism.plate_mm
+        self.plate = PlaneStressPlate(self.mesh, mechanism.material, thick_mm, used, bodies=bodies)
         return zones
 
     def _beside_sharp_corners(self, region: PlanarRegion, points: Array) -> NDArray[np.bool_]:
@@ -257,8 +270,8 @@ class MechanismPlate(ElasticMechanism):
     def peak_stress(self, moved: Array, *, large: bool = False) -> LargestStress:
         """Largest von Mises stress in the flexures at given displacements.
 
-        It is not a number in a drawing without flexures that has a re-entrant corner without a radius
-        (`unstated_stress_at_mm`): the stress has no limit there.
+        It is not a number in a drawing without flexures that has a re-entrant corner without a radius, or whose stress
+        is largest at the end of a face (`unstated_stress_at_mm`): the stress has no limit there.
         """
         if self.unstated_stress_at_mm is not None:
             return LargestStress(nan, self.unstated_stress_at_mm)

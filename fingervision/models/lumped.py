@@ -33,6 +33,7 @@ from fingervision.models.mechanism_faces import (
     per_input_of,
     with_actuators,
 )
+from fingervision.models.out_of_plane import held_bodies
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.models.plane_stress import PlaneStressPlate
 from fingervision.models.stiffness_matrix import ERRORS_OF_BARS
@@ -160,19 +161,22 @@ class MechanismFrame(ElasticMechanism):
             cut = PlanarRegion((*region.steps, *((False, span.slab) for span in self.spans)), region.marks_mm)
             self._mesh = mesh or triangulate(cut, _ACROSS, _BODY * region.size_mm)
         self._assemble()
-        if width_effect and any(not flexure.is_notch for flexure in mechanism.flexures):
+        if width_effect and mechanism.drives:
             # The restraint of a strip by its width depends on how the strip is loaded, which is known only now.
-            loads = self._unit_loads()
-            whole = 0.5 * self.stiffness_n_mm
+            loads, field = self._unit_loads(), self._field(self.driven.unit_displacement, large=False)
+            whole = float(self.plate.energies_n_mm(field).sum()) + sum(own for _, own in self._energies(loads))
             self.spans = tuple(
                 span
                 if span.flexure.is_notch
                 else replace(span, flexure=used_in_frame(span, loads[list(own)], self.plate, whole))
                 for span, own in zip(self.spans, self.segments, strict=True)
             )
-            self.mechanism = replace(mechanism, flexures=tuple(span.flexure for span in self.spans))
-            del self.driven
-            self._assemble()
+            bodies = held_bodies(self.plate, mechanism, field, whole, _FORCE_ERROR + mechanism.width_error)
+            flexures = tuple(span.flexure for span in self.spans)
+            if (flexures, bodies) != (mechanism.flexures, mechanism.held_bodies):
+                self.mechanism = replace(mechanism, flexures=flexures, held_bodies=bodies)
+                del self.driven
+                self._assemble()
 
     def _meshed_in_layers(self, region: PlanarRegion) -> tuple[PlaneMesh, tuple[Array, NDArray[np.int64]]]:
         """Triangles of all bodies, each alone, with the number of layers and of the body at every triangle."""
@@ -191,9 +195,9 @@ class MechanismFrame(ElasticMechanism):
     def _assemble(self) -> None:
         mechanism = self.mechanism
         zones = tuple(f.zone(mechanism.plate_mm) for f in mechanism.flexures if not f.is_notch)
-        used = zones if self._width_effect else ()
+        used, bodies = (zones, mechanism.held_bodies) if self._width_effect else ((), None)
         thick_mm = mechanism.halves * mechanism.plate_mm
-        self.plate = PlaneStressPlate(self._mesh, mechanism.material, thick_mm, used, *self._layers)
+        self.plate = PlaneStressPlate(self._mesh, mechanism.material, thick_mm, used, *self._layers, bodies=bodies)
         self.assembly = assemble_bodies(self.plate, mechanism, self.spans, self._size_mm)
         self._make_flexures()
 
@@ -302,8 +306,7 @@ class MechanismFrame(ElasticMechanism):
         """Relative errors of force and stress: as for flexures in bending, and larger for other loads on flexures."""
         loads, plate_mm = self._unit_loads(), self.mechanism.plate_mm
         misused, every, stress = 0.0, 0.0, 0.0
-        for span, own in zip(self.spans, self.segments, strict=True):
-            part, whole = misused_energy(span, loads[list(own)], self.frame.end_compliance[list(own)], plate_mm)
+        for span, (part, whole) in zip(self.spans, self._energies(loads), strict=True):
             misused, every = misused + part, every + whole
             if span.flexure.is_notch:
                 ratio = min(span.notch(plate_mm).curvature_ratio, 1.0)
@@ -316,6 +319,12 @@ class MechanismFrame(ElasticMechanism):
             leaves = [span.flexure for span in self.spans if not span.flexure.is_notch]
             force += _ROOT_IN_LAYERS * max((leaf.thickness_mm / leaf.bent_mm for leaf in leaves), default=0.0)
         return force + _FORCE_MISUSED * misused / max(every, _TINIEST), _STRESS_ERROR + stress
+
+    def _energies(self, loads: Array) -> list[tuple[float, float]]:
+        """Strain energy of every flexure outside its intended deformation, and its total strain energy (N mm)."""
+        found = zip(self.spans, map(list, self.segments), strict=True)
+        plate_mm, each = self.mechanism.plate_mm, self.frame.end_compliance
+        return [misused_energy(span, loads[own], each[own], plate_mm) for span, own in found]
 
     def _end_loads(self, moved: Array, *, large: bool) -> Array:
         """Tension and end moments of all segments of the flexures.

@@ -13,15 +13,17 @@ from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.gripper import Material, PointMm
 from fingervision.models.flexure import Flexure
 from fingervision.models.layers import Joint, Sheet, pieces_of, points_in
-from fingervision.models.planar_region import PlanarRegion
+from fingervision.models.planar_region import PlanarRegion, sharp_corners_mm
 from fingervision.models.plane_shapes import Shape, box, crossings
-from fingervision.models.width_effect import force_uncertainty
+from fingervision.models.width_effect import HeldBodies, force_uncertainty
 
 SIZES_MM = (0.3, 5000.0)
 """Sizes of flexure mechanisms, from etched silicon to large machines: drawings in metres or micrometres lie outside."""
 _OVER_DEPTH = 0.02
 """Variation of the stress over the plate's depth beside that by restraint, from wedge elements of CalculiX
 (`tests/benchmarks/models_three_dimensions.py`)."""
+_AT_CORNER = 1.01
+"""Size, over that of a flexure, of the rectangle in which corners belong to it."""
 _MOST_NAMED = 3
 """Pieces of a drawing that a message names."""
 _BETWEEN_ROOTS = 0.8
@@ -200,6 +202,8 @@ class Mechanism:
         as the plate, and parts of different layers are joined only by bodies that lie in both.
     notes : tuple of str
         Sentences on how the drawing was read.
+    held_bodies : HeldBodies or None
+        Restraint of the bodies beside the flexures by their width; None where they bend too little for it to matter.
     mirrored : bool
         Whether bodies, flexures and faces are the right half of a mechanism whose left half is its mirror image in the
         line x = 0. Forces of drives are those of both halves; a probe with x < 0 lies on the left half.
@@ -221,6 +225,7 @@ class Mechanism:
     mirrored: bool = False
     layers: tuple[tuple[int, ...], ...] = ()
     notes: tuple[str, ...] = ()
+    held_bodies: HeldBodies | None = None
 
     @property
     def halves(self) -> float:
@@ -241,6 +246,13 @@ class Mechanism:
         return tuple(flexure for flexure in self.flexures if flexure.found)
 
     @property
+    def sharp_ends(self) -> list[str]:
+        """Names of the leaves and strips at an end of which the outline has a corner without a radius."""
+        corners = np.reshape(sharp_corners_mm(self.region), (-1, 2)).T
+        zones = [(flexure, flexure.zone(self.plate_mm)) for flexure in self.flexures if not flexure.is_notch]
+        return [flexure.name for flexure, zone in zones if zone.grown(_AT_CORNER).holds(corners).any()]
+
+    @property
     def width_error(self) -> float:
         """Relative uncertainty of the force because the restraint of the flexures by the plate's width is uncertain."""
         doubt = max((flexure.width_doubt(self.plate_mm) for flexure in self.flexures), default=0.0)
@@ -252,14 +264,20 @@ class Mechanism:
 
         Where it is largest, the restraint by the width may be absent that makes the von Mises stress smaller.
         """
-        across = self.material.poisson_ratio * max((f.zone(self.plate_mm).stressed for f in self.flexures), default=0.0)
+        held = (
+            *(flexure.zone(self.plate_mm).stressed for flexure in self.flexures),
+            self.held_bodies.mean if self.held_bodies else 0.0,
+        )
+        across = self.material.poisson_ratio * max(held)
         return _OVER_DEPTH + 1.0 - sqrt(1.0 - across + across**2)
 
     @property
     def mode_error(self) -> float:
-        """Relative uncertainty of frequencies, because modes may load the strips otherwise than the input does."""
-        apart = max((flexure.width_range(self.plate_mm) for flexure in self.flexures), default=0.0)
-        return 0.5 * self.material.poisson_ratio**2 * apart
+        """Relative uncertainty of frequencies: modes may load strips and bodies otherwise than the input does."""
+        apart = [flexure.width_range(self.plate_mm) for flexure in self.flexures]
+        if self.held_bodies is not None:
+            apart.append(max(self.held_bodies.mean, 1.0 - self.held_bodies.mean))
+        return 0.5 * self.material.poisson_ratio**2 * max(apart, default=0.0)
 
     @property
     def joints(self) -> tuple[Joint, ...]:

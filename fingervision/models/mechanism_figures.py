@@ -280,7 +280,8 @@ def width_effect(model: ElasticMechanism) -> dict[str, float]:
 
     It is left out of `mechanism_figures`, because it takes a second model, and sweeps compute many drawings.
     """
-    if not model.mechanism.flexures or np.any(model.driven.rest_mm) or (plane := model.in_plane_stress) is None:
+    is_held = model.mechanism.flexures or model.mechanism.held_bodies is not None
+    if not is_held or np.any(model.driven.rest_mm) or (plane := model.in_plane_stress) is None:
         return {}
     return {"width_effect_force_percent": 100.0 * (model.stiffness_n_mm / plane.stiffness_n_mm - 1.0)}
 

@@ -1,7 +1,8 @@
-"""Out-of-plane motion of a mechanism with its drive fixed: natural modes, and the sag of a horizontal plate.
+"""Three-dimensional elements of a plate: motion out of its plane with the drive fixed, and bodies held by their width.
 
-Fixed faces and driven faces are fixed in all directions. A sliding face is fixed in its constrained direction at
-every depth, which on a plane of symmetry selects the symmetric modes.
+Motion out of the plane has natural modes, and the sag of a horizontal plate. Fixed faces and driven faces are then
+fixed in all directions. A sliding face is fixed in its constrained direction at every depth, which on a plane of
+symmetry selects the symmetric modes.
 """
 
 from collections.abc import Mapping
@@ -23,16 +24,18 @@ from fingervision.models.mechanism_equilibrium import factorised
 from fingervision.models.mechanism_faces import supports_of
 from fingervision.models.plane_stress import PlaneStressPlate, element_weights
 from fingervision.models.triangulate import PlaneMesh, triangulate
+from fingervision.models.width_effect import HeldBodies
 
 # Out-of-plane motion of a plate of any depth: quadratic triangles in the plane, polynomials through the depth.
 #
 # Displacements are u_i(x, y, z) = sum N_a(x, y) P_k(2 z / b) q_iak with shape functions N_a, depth b, unknowns q and
 # Legendre polynomials P_k: odd polynomials for the in-plane components, even polynomials for the out-of-plane
 # component. Odd and even polynomials together describe bending, torsion and shear of a plate that is symmetric about
-# its middle plane. The solution converges to three-dimensional elasticity as the order grows (hierarchic plate models:
-# Babuska and Li, 1992, Computer Methods in Applied Mechanics and Engineering 100, 249), without the assumptions of
-# plate or beam theory. Torsion of a deep neck therefore includes restrained warping, and bodies bend right up to their
-# junctions.
+# its middle plane; with even polynomials in the plane and odd ones out of it, they describe motion in the plane, in
+# which the plate becomes thinner and thicker. The solution converges to three-dimensional elasticity as the order
+# grows (hierarchic plate models: Babuska and Li, 1992, Computer Methods in Applied Mechanics and Engineering 100, 249),
+# without the assumptions of plate or beam theory. Torsion of a deep neck therefore includes restrained warping, and
+# bodies bend right up to their junctions.
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -56,16 +59,30 @@ class DeepPlate:
     plate_mm : float
         Depth of the plate (out of the plane).
     order : int
-        Odd order of the polynomials through the depth for the in-plane components.
+        Largest order of the polynomials through the depth, an odd one.
+    in_plane : bool
+        Whether the plate moves in its plane instead.
+    triangles : ndarray of int, or None
+        Triangles of the mesh that are part of the plate; None for all.
     """
 
-    def __init__(self, mesh: PlaneMesh, material: Material, plate_mm: float, order: int = _ORDER) -> None:
+    def __init__(
+        self,
+        mesh: PlaneMesh,
+        material: Material,
+        plate_mm: float,
+        order: int = _ORDER,
+        *,
+        in_plane: bool = False,
+        triangles: Indices | None = None,
+    ) -> None:
         self.material, self.plate_mm = material, plate_mm
-        self._basis = skfem.Basis(skfem.MeshTri2(mesh.nodes_mm, mesh.triangles), skfem.ElementTriP2(), intorder=4)
+        whole = skfem.MeshTri2(mesh.nodes_mm, mesh.triangles)
+        self._basis = skfem.Basis(whole, skfem.ElementTriP2(), elements=triangles, intorder=4)
         self.nodes_mm: Array = self._basis.doflocs
         odd = [np.eye(order + 1)[k] for k in range(1, order + 1, 2)]
         even = [np.eye(order + 1)[k] for k in range(0, order, 2)]
-        self._shapes = odd, odd, even
+        self._shapes = (even, even, odd) if in_plane else (odd, odd, even)
 
     @property
     def unknowns(self) -> int:
@@ -138,6 +155,49 @@ class DeepPlate:
         nodes, weights = element_weights(self.nodes_mm, self._basis.element_dofs, point)
         values = moved[self.coefficients(nodes, 2)].reshape(nodes.size, -1) @ _even_at_middle(len(self._shapes[2]))
         return float(weights @ values)
+
+    def relaxed(self, means_mm: tuple[Array, Array], nodes: Indices, guided: Indices) -> Array:
+        """Coefficients of the equilibrium at prescribed displacements in the plane.
+
+        Parameters
+        ----------
+        means_mm : (ndarray, ndarray)
+            Displacements of all nodes along x and y, uniform over the depth.
+        nodes, guided : ndarray of int
+            Nodes that are free to move, some of them guided: their means over the depth stay as given.
+        """
+        moved = np.zeros(self.unknowns)
+        every = np.arange(self.nodes_mm.shape[1])
+        for way, values in enumerate(means_mm):
+            moved[self.coefficients(every, way)[:: len(self._shapes[way])]] = values
+        kept = [self.coefficients(guided, way)[:: len(self._shapes[way])] for way in range(2)]
+        free = np.setdiff1d(np.concatenate([self.coefficients(nodes, way) for way in range(3)]), np.concatenate(kept))
+        loads = self.stiffness_n_mm[free] @ moved
+        moved[free] -= factorised(self.stiffness_n_mm[free][:, free]).solve(loads)
+        return moved
+
+    def energies_n_mm(self, moved: Array) -> Array:
+        """Strain energy of every triangle of the plate, shape (m,)."""
+        E, nu = self.material.youngs_modulus_mpa, self.material.poisson_ratio
+        lame, shear = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), self.material.shear_modulus_mpa
+        nodes = np.arange(self.nodes_mm.shape[1])
+        parts = [
+            [self._basis.interpolate(np.ascontiguousarray(each))
+             for each in moved[self.coefficients(nodes, way)].reshape(nodes.size, -1).T]
+            for way in range(3)
+        ]  # fmt: skip
+        points, weights = legendre.leggauss(2 * len(self._shapes[0]) + 2)
+        density = 0.0
+        for point, weight in zip(points, weights, strict=True):
+            slopes = np.zeros((3, 3, *self._basis.dx.shape))
+            for way, (shapes, fields) in enumerate(zip(self._shapes, parts, strict=True)):
+                for shape, part in zip(shapes, fields, strict=True):
+                    slopes[way, :2] += legendre.legval(point, shape) * part.grad
+                    slopes[way, 2] += legendre.legval(point, legendre.legder(shape)) * 2.0 / self.plate_mm * part
+            strain = 0.5 * (slopes + np.swapaxes(slopes, 0, 1))
+            squares = np.einsum("ij...,ij...->...", strain, strain)
+            density = density + weight * (0.5 * lame * np.einsum("ii...->...", strain) ** 2 + shear * squares)
+        return np.asarray((density * self._basis.dx).sum(axis=1) * 0.5 * self.plate_mm)
 
     def supported(self, held: Indices) -> "SupportedPlate":
         """Return the plate with the given coefficients fixed to zero."""
@@ -246,3 +306,72 @@ def out_of_plane(
         for name, (x, y) in mechanism.probes.items()
     }
     return OutOfPlane(body.modes_hz(count), sag_mm)
+
+
+_ORDER_OF_BODIES = 5
+"""Order of the polynomials through the depth for bodies that bend in the plane: a notch 16 times as wide as thick is
+0.3 % stiffer than with order 7, which has the stiffness of the tables for hinges."""
+_TINIEST = 1e-300
+_MOST_OF_THEM = 0.999
+"""Share of the bodies' strain energy that is computed in three dimensions: the parts that bend least come last, and
+they hold the width of those that bend more."""
+
+
+def held_bodies(
+    plate: PlaneStressPlate, mechanism: Mechanism, moved: Array, whole_n_mm: float, error: float
+) -> HeldBodies | None:
+    """Weights of plane strain in what bends beside the flexures: parts of bodies that no theory of flexures describes.
+
+    A thin part that is no straight strip and no symmetric notch (a curved spring, a neck between unlike arcs or at a
+    hole) is held by its width as flexures are. Three-dimensional elements give its strain energy where the rest of the
+    plate moves as in plane stress, and how this energy is shared by the triangles; what the input does not bend has no
+    weight.
+
+    Parameters
+    ----------
+    plate : PlaneStressPlate
+        The bodies, in plane stress beside the flexures.
+    mechanism : Mechanism
+        The drawing.
+    moved : ndarray of float
+        Displacements of the plate per input.
+    whole_n_mm : float
+        Strain energy of the whole mechanism at these displacements.
+    error : float
+        Relative error of the force that is stated anyway.
+
+    Returns
+    -------
+    HeldBodies or None
+        The weights; None where the width changes the force by less than the error.
+    """
+    if mechanism.held_bodies is not None:
+        return mechanism.held_bodies
+    poisson_squared = mechanism.material.poisson_ratio**2
+    energies = plate.energies_n_mm(moved)
+    for flexure in mechanism.flexures:
+        energies[flexure.zone(mechanism.plate_mm).holds(plate.middles_mm)] = 0.0
+    if mechanism.layers or poisson_squared * energies.sum() <= error * whole_n_mm:
+        return None
+    order = np.argsort(energies)[::-1]
+    most = int(np.searchsorted(np.cumsum(energies[order]), _MOST_OF_THEM * energies.sum())) + 1
+    bent = np.sort(order[:most])
+    supports = supports_of(plate, mechanism, mechanism.region.size_mm)
+    still = [plate.nodes_of_triangles[:, order[most:]].ravel(), *supports.fixed]
+    guided = [*supports.driven, *(nodes for nodes, _ in supports.slides)]
+    inner = np.setdiff1d(plate.nodes_of_triangles[:, bent], np.concatenate(still))
+    thick_mm = plate.plate_mm / mechanism.halves
+    deep = DeepPlate(plate.mesh, mechanism.material, thick_mm, _ORDER_OF_BODIES, in_plane=True, triangles=bent)
+    relaxed = deep.relaxed(
+        (moved[plate.x_dofs], moved[plate.y_dofs]), inner, np.intersect1d(inner, np.concatenate(guided))
+    )
+    every, means = np.arange(plate.nodes_mm.shape[1]), np.zeros_like(moved)
+    for way, dofs in enumerate((plate.x_dofs, plate.y_dofs)):
+        means[dofs] = relaxed[deep.coefficients(every, way)].reshape(every.size, -1)[:, 0]
+    held, solid = plate.energies_n_mm(means)[bent], mechanism.halves * deep.energies_n_mm(relaxed)
+    mean = float(np.clip((1.0 - energies[bent].sum() / solid.sum()) / poisson_squared, 0.0, 1.0))
+    # The width also spreads the bending: where it is held most, the plate bends less than in plane stress.
+    spread = mean * solid.sum() / max(float((solid - held).sum()), _TINIEST)
+    shares = np.zeros(energies.size)
+    shares[bent] = np.clip((1.0 - held / solid) * spread, 0.0, 1.0)
+    return HeldBodies(plate.middles_mm, shares, mean)

@@ -14,7 +14,7 @@ from skfem.helpers import dot, eye, mul, trace, transpose
 
 from fingervision.domain.gripper import Material
 from fingervision.models.triangulate import PlaneMesh
-from fingervision.models.width_effect import ConstrainedZone, held_moduli, shares_at
+from fingervision.models.width_effect import ConstrainedZone, HeldBodies, held_moduli, shares_at
 
 # Find the element of a mesh in which a point lies, so that the point moves with this element.
 #
@@ -112,18 +112,20 @@ class PlaneStressPlate:
     layers, pieces : ndarray, shape (m,), or None
         Number of layers, each as thick as the plate, at every triangle, and number of the body to which it belongs;
         None for one layer.
+    bodies : HeldBodies or None
+        Restraint outside the zones; None for plane stress there.
     """
 
     def __init__(
         self, mesh: PlaneMesh, material: Material, plate_mm: float, zones: tuple[ConstrainedZone, ...] = (),
-        layers: Array | None = None, pieces: Indices | None = None,
+        layers: Array | None = None, pieces: Indices | None = None, bodies: HeldBodies | None = None,
     ) -> None:  # fmt: skip
         self.material = material
         self.pieces, self._thick_mm = pieces, plate_mm * (np.ones(1) if layers is None else layers)[:, None]
         self.plate_mm = plate_mm
         self._located: dict[tuple[float, float], tuple[Indices, Array]] = {}
-        middles = mesh.nodes_mm[:, mesh.triangles[:3]].mean(axis=1)
-        self._share, self._stressed = shares_at(zones, middles)[:, :, None]
+        self.mesh = mesh
+        self._share, self._stressed = shares_at(zones, self.middles_mm, bodies)[:, :, None]
         self._moduli = held_moduli(material, self._share)
         self._mesh = skfem.MeshTri2(mesh.nodes_mm, mesh.triangles)
         self._element = skfem.ElementVector(skfem.ElementTriP2())
@@ -132,6 +134,11 @@ class PlaneStressPlate:
         self.x_dofs: Indices = np.concatenate([nodal[0], edge[0]])
         self.y_dofs: Indices = np.concatenate([nodal[1], edge[1]])
         self.nodes_mm: Array = self._basis.doflocs[:, self.x_dofs]
+
+    @property
+    def middles_mm(self) -> Array:
+        """Middles of the triangles, shape (2, m)."""
+        return np.asarray(self.mesh.nodes_mm[:, self.mesh.triangles[:3]].mean(axis=1))
 
     @property
     def unknowns(self) -> int:
@@ -266,12 +273,23 @@ class PlaneStressPlate:
         """Nodal forces of the deformed plate without the tangent stiffness, at a tenth of the cost."""
         return self._collected(*self._deformed(displacement_mm))
 
-    def _deformed(self, displacement_mm: Array) -> tuple[Array, Array]:
-        """Deformation gradient, shape (m, q, 2, 2), and second Piola-Kirchhoff stress, shape (m, q, 3)."""
+    def energies_n_mm(self, displacement_mm: Array) -> Array:
+        """Strain energy of every triangle at small displacements, shape (m,)."""
+        gradient = self._gradient(displacement_mm)
+        shear = gradient[..., 0, 1] + gradient[..., 1, 0]
+        strain = np.stack([gradient[..., 0, 0], gradient[..., 1, 1], shear], axis=-1)
+        return np.asarray(0.5 * np.einsum("mqi,mqi,mq->m", strain @ self._law[:, 0], strain, self._slopes[1]))
+
+    def _gradient(self, displacement_mm: Array) -> Array:
+        """Derivatives of the displacements by x and y, the latter in the second to last axis; shape (m, q, 2, 2)."""
         slopes, weights = self._slopes
         triangles, points = weights.shape
         moved = np.swapaxes(displacement_mm[self.unknowns_of_triangles].reshape(-1, 2, 6), 1, 2)
-        gradient = (slopes.reshape(triangles, 2 * points, 6) @ moved).reshape(triangles, points, 2, 2)
+        return np.asarray((slopes.reshape(triangles, 2 * points, 6) @ moved).reshape(triangles, points, 2, 2))
+
+    def _deformed(self, displacement_mm: Array) -> tuple[Array, Array]:
+        """Deformation gradient, shape (m, q, 2, 2), and second Piola-Kirchhoff stress, shape (m, q, 3)."""
+        gradient = self._gradient(displacement_mm)
         ux, vx = gradient[..., 0, 0], gradient[..., 0, 1]
         uy, vy = gradient[..., 1, 0], gradient[..., 1, 1]
         strain = np.stack([ux + 0.5 * (ux * ux + vx * vx), vy + 0.5 * (uy * uy + vy * vy),

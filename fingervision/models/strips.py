@@ -266,7 +266,7 @@ def _notch(region: PlanarRegion, first: _Face, second: _Face) -> Flexure | None:
         opened += [part.max() for part in beyond]
         bends = rise < thickness
         error = rise - depth * (1.0 - np.sqrt(1.0 - np.minimum(np.abs(x) / length, 1.0) ** 2))
-        if np.abs(error[bends]).max() > _ON_FORM * thickness:
+        if not bends.any() or np.abs(error[bends]).max() > _ON_FORM * thickness:
             return None
         off.append(float(error[np.argmin(np.abs(x))]))
     if opened.min() < _OPENS * thickness:

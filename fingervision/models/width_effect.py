@@ -6,11 +6,13 @@ short compared with its width is therefore stiffer than in plane stress, by a fa
 strain (nu: Poisson's ratio). The weight w of plane strain (0 to 1) comes from brick elements (`hinge_correction`).
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import cos, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from fingervision.domain.gripper import Material, PointMm
 
@@ -46,6 +48,11 @@ class ConstrainedZone:
     share: float
     stressed: float
 
+    def grown(self, factor: float) -> "ConstrainedZone":
+        """The zone with both extents multiplied by a factor."""
+        length, height = factor * self.half_length_mm, factor * self.half_height_mm
+        return replace(self, half_length_mm=length, half_height_mm=height)
+
     def holds(self, points: Array) -> NDArray[np.bool_]:
         """Whether points, shape (2, n), lie in the zone."""
         c, s = cos(radians(self.axis_deg)), sin(radians(self.axis_deg))
@@ -55,12 +62,37 @@ class ConstrainedZone:
         )
 
 
-def shares_at(zones: tuple[ConstrainedZone, ...], points: Array) -> Array:
-    """Shares of plane strain in stiffness and stress at given points, shape (2, n); 0 outside the zones."""
-    shares = np.zeros((2, points.shape[1]))
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldBodies:
+    """Restraint of bodies by their width, where they bend: shares of plane strain that differ from place to place.
+
+    Parameters
+    ----------
+    points_mm : ndarray of float, shape (2, n)
+        Places at which the shares are known.
+    shares : ndarray of float, shape (n,)
+        Shares of plane strain.
+    mean : float
+        Mean of the shares, weighted by the strain energy.
+    """
+
+    points_mm: Array
+    shares: Array
+    mean: float
+
+    def at(self, points: Array) -> Array:
+        """Shares at other places, shape (2, m): those of the nearest known ones."""
+        return np.asarray(self.shares[KDTree(self.points_mm.T).query(points.T)[1]])
+
+
+def shares_at(zones: Sequence[ConstrainedZone], points: Array, bodies: HeldBodies | None = None) -> Array:
+    """Shares of plane strain in stiffness and stress at given points, shape (2, n); `bodies` outside the zones."""
+    shares = np.zeros((2, points.shape[1])) if bodies is None else np.tile(bodies.at(points), (2, 1))
+    inside = np.zeros(points.shape[1], dtype=bool)
     for zone in zones:
-        own = np.array([[zone.share], [zone.stressed]])
-        shares = np.where(zone.holds(points), np.maximum(shares, own), shares)
+        own, here = np.array([[zone.share], [zone.stressed]]), zone.holds(points)
+        shares = np.where(here, np.where(inside, np.maximum(shares, own), own), shares)
+        inside |= here
     return shares
 
 

@@ -88,7 +88,7 @@ class CopyTable:
 
     of: Annotated[
         tuple[str, ...],
-        Field("names of the bodies, fillets, flexures, fixed faces and probes; all of those above by default"),
+        Field("names of the bodies, fillets, flexures, fixed faces and probes; by default all, and the copies above"),
     ] = ()
     suffix: Annotated[str, Field("what is added to the names of the copies; ` copy` by default")] = _COPY
     mirror_x_mm: Annotated[float | None, Field("reflects them in the line x = this", "mm")] = None

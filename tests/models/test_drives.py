@@ -286,7 +286,8 @@ flexure = [{ name = "h", kind = "leaf", at_mm = [21, 0], axis_deg = 0, thickness
     (tmp_path / "beam.toml").write_text(text)
     mechanism = read_mechanism(tmp_path / "beam.toml")
     for kind in (MechanismFrame, MechanismPlate):
-        assert kind(mechanism).stiffness_n_mm == pytest.approx(3.0 * 70000.0 * 5.0 / 12.0 / 19.5**3, rel=0.02)
+        plane = kind(mechanism, width_effect=False)
+        assert plane.stiffness_n_mm == pytest.approx(3.0 * 70000.0 * 5.0 / 12.0 / 19.5**3, rel=0.02)
 
 
 HELD = """
@@ -322,7 +323,8 @@ def test_a_bent_strip_is_as_slender_as_a_straight_one(tmp_path: Path, kind: type
     """An L of 8 by 8 mm is a beam of 14 by 2 mm: of both arms' bending, 3 E I / (b^3 + 3 a b^2)."""
     a, b = 7.0, 6.5
     beam_n_mm = 3.0 * 70000.0 * 5.0 * 2.0**3 / 12.0 / (b**3 + 3.0 * a * b**2)
-    assert kind(held_body(tmp_path, 8.0, 8.0)).stiffness_n_mm == pytest.approx(beam_n_mm, rel=0.08)
+    plane = kind(held_body(tmp_path, 8.0, 8.0), width_effect=False)
+    assert plane.stiffness_n_mm == pytest.approx(beam_n_mm, rel=0.08)
     assert kind(held_body(tmp_path, 2.0, 14.0)).stiffness_n_mm > 0.0
     for stubby in ((2.0, 6.0), (4.0, 4.0)):
         with pytest.raises(DataError, match="must be able to move its body"):
