@@ -123,7 +123,7 @@ def compare(table: MeasuredTable, model: CorrectedModel, *, seed: int = 1) -> Co
         data = replace(data, notes=(*data.notes, *notes))
     mistake = mistaken_column(data, problem, (problem.nothing(),))
     if mistake is not None:
-        data = replace(data, notes=(*data.notes, mistake.words))
+        data = replace(data, notes=(*data.notes, mistake))
     n, both = history.input_mm.size, history.both_edges
     aside = isolated(residual[:n], problem.whitener.aside[:n], history.runs)
     counted = np.concatenate([part[~aside] for part in np.split(residual, len(data.channels))])

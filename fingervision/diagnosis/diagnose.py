@@ -13,7 +13,13 @@ from fingervision.diagnosis.inference.explanation_candidates import Progress, si
 from fingervision.diagnosis.inference.held_out_prediction import foretold
 from fingervision.diagnosis.inference.hypothesis import Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
-from fingervision.diagnosis.inference.plausibility import mistaken_column, mixed_rows, swapped_directions
+from fingervision.diagnosis.inference.plausibility import (
+    UNRELATED,
+    mistaken_beside_effects,
+    mistaken_column,
+    mixed_rows,
+    swapped_directions,
+)
 from fingervision.diagnosis.inference.position_map import NAME, map_columns, set_points
 from fingervision.diagnosis.inference.posterior import beside_alternatives
 from fingervision.diagnosis.inference.random_effect import LEAST_GAIN
@@ -255,12 +261,9 @@ def _explained(
     data = prepare(table, model, without)
     refitted = _searched(data, rng, forced, without, progress)
     data, found = refitted.data, refitted.found
-    rivals = (found.nothing, found.nearest, found.best, *found.singles)
-    mistake = mistaken_column(data, found.problem, rivals) or swapped_directions(data, found.problem, rivals)
-    if mistake is None and found.unknown is None:
-        mistake = mixed_rows(data, found.best, found.problem)
-    if mistake is not None and mistake.blocks:
-        data, found = without_names(data, found, mistake.words.rstrip("."))
+    mistake = _mistake(data, found, Look(rng, frozenset(), lambda _: None))
+    if mistake is not None:
+        data, found = without_names(data, found, mistake.rstrip("."))
         found = replace(found, left_over=None)
     answered = judged(data, found if forced else foretold(data, found))
     report = diagnosis_report(answered, refitted.posterior, mistake, forced, rng, begin_s)
@@ -274,6 +277,16 @@ def _explained(
         positioning,
         left_out=answered.stands.left_out,
     )
+
+
+def _mistake(data: Observations, found: Findings, look: Look) -> str | None:
+    """The question about the table, if a mistake in it explains far more than any effect."""
+    rivals = (found.nothing, found.nearest, found.best, *found.singles)
+    column = mistaken_column(data, found.problem, rivals)
+    if column is None or column == UNRELATED:
+        column = mistaken_beside_effects(data, found, look) or column
+    asked = column or swapped_directions(data, found.problem, rivals)
+    return mixed_rows(data, found.best, found.problem) if asked is None and found.unknown is None else asked
 
 
 def _searched(

@@ -149,6 +149,25 @@ def test_a_model_in_another_unit_is_said_and_nothing_is_named(tmp_path: Path, sc
     assert float(said.group(1)) == pytest.approx(1.0 / scale, rel=0.01)
 
 
+@pytest.mark.parametrize("gain", [1.0, -1.0, 1.0 / 25.4])
+def test_a_servo_that_lags_far_does_not_hide_a_mistaken_column(tmp_path: Path, gain: float) -> None:
+    # A dead time and a speed limit leave half of the motion unexplained: no gain alone explains the other half.
+    rng = np.random.default_rng(11)
+    time_s = 0.1 * np.arange(240)
+    u = np.repeat(rng.uniform(0.0, 2.0, 24), 10)
+    late = np.interp(time_s - 0.3, time_s, u)
+    gap = np.empty_like(late)
+    at = late[0]
+    for k, aim in enumerate(late):
+        at = float(np.clip(aim, at - 0.25, at + 0.25))
+        gap[k] = at
+    gap = GAP_MM + gain * (gap + NOISE_MM * rng.standard_normal(u.size))
+    report = asked(tmp_path, {"time_s": time_s, "input_mm": u, "gap_mm": gap})
+    asks = re.search("is mirrored|0.0394 times as far", report.unknown or "")
+    assert (asks is not None) == (gain != 1.0)
+    assert bool(report.effects) == (gain == 1.0)
+
+
 def test_an_end_stop_that_holds_a_model_in_micrometres_still_explains_nothing() -> None:
     measured = fv.measure(
         SAMPLE / "opening.mp4", calibration=SAMPLE / "calibration.json", drive=SAMPLE / "drive.csv"

@@ -1,13 +1,16 @@
 """Mistakes in a table as hypotheses beside the effects: a mirrored or rescaled column, or exchanged directions."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import bdtr, bdtrc
 
 from fingervision.diagnosis.inference.evidence import STRONG, odds
 from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Problem
+from fingervision.diagnosis.inference.search import Look
+from fingervision.diagnosis.inference.search_state import Findings
+from fingervision.diagnosis.inference.verdict import standing_of
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
@@ -50,15 +53,14 @@ BY_CHANCE = 1e-3
 one noise, rounded to a quarter of the noise, 40 % agreed by chance (probability 0.002)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """A mistake in the table, as a sentence; if `blocks` is True, no effect can be named until it is corrected."""
+UNRELATED = (
+    "the measured gap does not follow the input at all: check which columns hold the input and the gap, and whether "
+    "they belong to the same measurement."
+)
+"""Question about a gap that has nothing to do with the input."""
 
-    words: str
-    blocks: bool
 
-
-def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Explanation]) -> Finding | None:
+def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Explanation]) -> str | None:
     """Ask about sign or unit of a column, if that alone explains the table far better than any physical explanation.
 
     A mistaken column is a hypothesis beside the effects: the gap follows the model with a gain of -1, of a ratio of
@@ -84,39 +86,110 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
     gains += [] if free is None else [(free, 1)]
     if not any(rival.names for rival in rivals):
         gains = [each for each in gains if each[0] > 0.0 and not 1.0 / LARGEST_RATIO < each[0] < LARGEST_RATIO]
-    able = [each for each in gains if _leaves_less(data, problem, each[0])]
-    # Three kinds of mistake are equally likely beforehand: a column of something else, a sign, and one of many ratios.
-    price = {gain: 2.0 * float(np.log(3.0 * (1 if gain in (0.0, -1.0) else len(gains)))) for gain, _ in gains}
-    tried = [(_cost(data, problem, *each) + price[each[0]], each[0]) for each in able]
+    able = [each for each in gains if _leaves_less(data, problem, each[0] * _moved(data))]
+    tried = [(_cost(data, problem, each[0] * _moved(data), each[1]) + _choice(each[0]), each[0]) for each in able]
     if not tried:
         return None
     cost, gain = min(tried)
     explaining = [each for each in rivals if not each.names or _explains(data, problem, each)]
     if cost > _physical(problem, explaining) - STRONG:
         return None
+    return _asked(gain)
+
+
+def mistaken_beside_effects(data: Observations, found: Findings, look: Look) -> str | None:
+    """Ask about sign or unit of a column, if the corrected table is explained far better than the table as it is.
+
+    A stage that lags by a quarter of its motion hides that its gap is in inches: no gain alone explains half of it, and
+    a speed limit at a fraction of the speed, with another rest gap, imitates it. The table is corrected by a gain and
+    searched for effects, like the table itself; the odds of the two are compared. This is done if the table as it is
+    remains unexplained, or if its gap moves by more or less than effects cause where no gain was fitted.
+
+    Parameters
+    ----------
+    data : Observations
+        Measurement and model.
+    found : Findings
+        Findings of the search of the table as it is.
+    look : Look
+        Settings of the search of the corrected table.
+    """
+    problem, n = found.problem, data.chain.history.input_mm.size
+    kept = ~problem.whitener.aside[:n]
+    moved = float(np.std(_moved(data)[:n][kept]))
+    ratio = float(np.std(data.table.gap_mm[kept])) / moved if moved > 0.0 else 0.0
+    plausible = 1.0 / LARGEST_RATIO < ratio < LARGEST_RATIO
+    if not ratio or (plausible and found.unknown is None and standing_of(data, found).is_little):
+        return None
+    size = _nearest_unit(ratio)
+    nothing = np.zeros_like(data.stacked_mm)
+    tried = [(_cost(data, problem, nothing, 0) + _choice(0.0), 0.0)] if _leaves_less(data, problem, nothing) else []
+    for gain in (-size,) if plausible else (size, -size):
+        best = look.again(_corrected(data, gain)).found
+        changed = data.chain.stacked(best.best.values) - data.chain.stacked({})
+        changed[:n] *= gain
+        following = gain * _moved(data) + changed
+        if _leaves_less(data, problem, following):
+            price = odds(best.problem, best.best) - best.best.score + _choice(gain)
+            tried.append((_cost(data, problem, following, abs(gain) == ratio) + price, gain))
+    explaining = [e for e in (found.nothing, found.nearest, found.best, *found.singles) if _explains(data, problem, e)]
+    rival = _physical(problem, [found.nothing, *explaining])
+    return _asked(min(tried)[1]) if tried and min(tried)[0] < rival - STRONG else None
+
+
+def _nearest_unit(ratio: float) -> float:
+    """The ratio of units that differs from a ratio by no more than effects cause, or else the ratio itself."""
+    near = min((1.0, *UNITS, *(1.0 / unit for unit in UNITS)), key=lambda unit: abs(np.log(ratio / unit)))
+    return near if 1.0 / LARGEST_RATIO < ratio / near < LARGEST_RATIO else ratio
+
+
+def _corrected(data: Observations, gain: float) -> Observations:
+    """Return the observations with a gap that moves by the inverse of a gain as far, about its mean."""
+    n = data.chain.history.input_mm.size
+    middle_mm = float(np.mean(data.chain.stacked({})[:n]))
+    gap_mm = middle_mm + (data.table.gap_mm - np.mean(data.table.gap_mm)) / gain
+    known = data.table.u_random_mm
+    table = replace(data.table, gap_mm=gap_mm, u_random_mm=None if known is None else known / abs(gain))
+    stacked = np.concatenate([gap_mm, data.stacked_mm[n:]])
+    return replace(data, table=table, stacked_mm=stacked, position_map=None, run_gains=None)
+
+
+def _choice(gain: float) -> float:
+    """-2 log of the prior probability of a mistake.
+
+    Three kinds are equally likely beforehand: a column of something else, a sign, and one of many ratios.
+    """
+    return 2.0 * float(np.log(3.0 * (1 if gain in (0.0, -1.0) else 4 * len(UNITS))))
+
+
+def _asked(gain: float) -> str:
+    """The question about a column whose gap moves by a gain as far as the model."""
     if gain == 0.0:
-        words = (
-            "the measured gap does not follow the input at all: check which columns hold the input and the gap, and "
-            "whether they belong to the same measurement."
-        )
-    elif gain < 0.0:
+        return UNRELATED
+    if gain < 0.0:
         far = "" if gain == -1.0 else f", and {-gain:.3g} times as far"
-        words = (
+        return (
             f"the measured gap falls where the model predicts a rise{far}: input_mm or the gap is mirrored (its sign "
             "is wrong), or the model belongs to another test bed."
         )
-    else:
-        words = (
-            f"the measured gap moves {gain:.3g} times as far as the model predicts: check the units of the gap, the "
-            "input and the model (a factor of 1000 means micrometres instead of millimetres, 25.4 means inches), "
-            "because effects of the catalogue are hardly so large."
-        )
-    return Finding(words, blocks=True)
+    return (
+        f"the measured gap moves {gain:.3g} times as far as the model predicts: check the units of the gap, the "
+        "input and the model (a factor of 1000 means micrometres instead of millimetres, 25.4 means inches), "
+        "because effects of the catalogue are hardly so large."
+    )
 
 
 def _physical(problem: Problem, rivals: Sequence[Explanation]) -> float:
-    """-2 log odds of the most probable explanation by effects."""
-    return min(odds(problem, rival) for rival in rivals)
+    """-2 log odds of the most probable explanation by effects, at a noise whose level is unknown."""
+    return min(_at_any_noise(problem, rival.score) + odds(problem, rival) - rival.score for rival in rivals)
+
+
+def _at_any_noise(problem: Problem, score: float) -> float:
+    """-2 log of the likelihood, integrated over the level of the noise.
+
+    The noise was estimated from what the effects leave, and may contain the mistake.
+    """
+    return problem.rows * float(np.log(max(score, 1e-300) / problem.rows))
 
 
 def _moved(data: Observations) -> Array:
@@ -148,22 +221,22 @@ def _free_gain(data: Observations, problem: Problem) -> float | None:
     return float(column @ _beside_constants(data, problem, data.stacked_mm)) / power if power > 0.0 else None
 
 
-def _cost(data: Observations, problem: Problem, gain: float, fitted: int) -> float:
-    """BIC of the model with another gain and without effects; the constant of each channel is fitted."""
-    residual = _beside_constants(data, problem, data.stacked_mm - gain * _moved(data))
+def _cost(data: Observations, problem: Problem, following_mm: Array, fitted: int) -> float:
+    """BIC of a gap that follows a curve, with `fitted` numbers; the constant of each channel is fitted."""
+    residual = _beside_constants(data, problem, data.stacked_mm - following_mm)
     sigma, penalty = problem.offsets.spread(residual)
     free = fitted + data.stacked_mm.size // data.chain.history.input_mm.size
     score = problem.offsets.squared(residual, problem.offsets.metric(sigma)) + penalty
-    return score + free * float(np.log(max(2, residual.size)))
+    return _at_any_noise(problem, score) + free * float(np.log(max(2, residual.size)))
 
 
-def _leaves_less(data: Observations, problem: Problem, gain: float) -> bool:
-    """Whether a gain leaves less than half of the variance of the disagreement and, unless it is 0, of the gap."""
+def _leaves_less(data: Observations, problem: Problem, following_mm: Array) -> bool:
+    """Whether a curve leaves less than half of the variance of the disagreement and, unless it is 0, of the gap."""
     n = data.chain.history.input_mm.size
     kept = ~problem.whitener.aside[:n]
-    gap, moved = data.table.gap_mm[kept], _moved(data)[:n][kept]
-    left, disagreement, all_of_it = (float(np.var(each)) for each in (gap - gain * moved, gap - moved, gap))
-    return left < HALF * (min(disagreement, all_of_it) if gain else disagreement)
+    gap, moved, following = data.table.gap_mm[kept], _moved(data)[:n][kept], following_mm[:n][kept]
+    left, disagreement, all_of_it = (float(np.var(each)) for each in (gap - following, gap - moved, gap))
+    return left < HALF * (min(disagreement, all_of_it) if following.any() else disagreement)
 
 
 def _explains(data: Observations, problem: Problem, found: Explanation) -> bool:
@@ -174,7 +247,7 @@ def _explains(data: Observations, problem: Problem, found: Explanation) -> bool:
     return float(np.var(left)) < HALF * float(np.var(data.stacked_mm[:n][kept]))
 
 
-def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Finding | None:
+def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> str | None:
     """Check whether the residual has one noise level: a mixture of right and wrong rows would have two levels.
 
     Parameters
@@ -218,10 +291,7 @@ def mixed_rows(data: Observations, found: Explanation, problem: Problem) -> Find
         )
     else:
         return None
-    return Finding(
-        f"the rows are not one measurement with one noise: {words}; check the rows that differ first.",
-        blocks=True,
-    )
+    return f"the rows are not one measurement with one noise: {words}; check the rows that differ first."
 
 
 def _about_each_run(values: Array, data: Observations, kept: Flags) -> Array:
@@ -252,7 +322,7 @@ def _share_near(values: Array, middle: float) -> float:
     return float(np.mean(np.abs(values - middle) < NARROW * float(np.std(values))))
 
 
-def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Explanation]) -> Finding | None:
+def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Explanation]) -> str | None:
     """Ask about play of the wrong sign, by which the gap leads the input at reversals, if no effect explains as much.
 
     Exchanged directions are a hypothesis beside the effects: a leading play, with an offset and a ratio, must explain
@@ -286,11 +356,14 @@ def swapped_directions(data: Observations, problem: Problem, rivals: Sequence[Ex
     gain, size_mm = float(gains[best]), float(size[best] * widths[best])
     stands = float(WhitenedColumns(residual[:, None], problem.offsets).against(residual, metric, lines)[1][0])
     # Four numbers are fitted: offset and ratio, size and width of the play.
-    cost = stands - gain + 4.0 * float(np.log(residual.size)) + 2.0 * float(np.log(len(problem.effects)))
+    cost = (
+        _at_any_noise(problem, stands - gain)
+        + 4.0 * float(np.log(residual.size))
+        + 2.0 * float(np.log(len(problem.effects)))
+    )
     if gain < HALF * stands or cost > _physical(problem, rivals) - STRONG:
         return None
-    return Finding(
+    return (
         f"at reversals the gap leads the input by {1e3 * abs(size_mm):.3g} um instead of lagging behind it, which no "
-        "mechanism does: are the directions swapped, or is the sign of the gap wrong?",
-        blocks=True,
+        "mechanism does: are the directions swapped, or is the sign of the gap wrong?"
     )

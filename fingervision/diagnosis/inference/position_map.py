@@ -35,6 +35,8 @@ of the position that could have been measured in advance."""
 PASSES = 1.8
 """Least ratio of travel to range, so that each position was passed twice: an error seen once is not known to be
 repeatable."""
+LARGEST = 0.1
+"""Largest RMS size of a map as a share of the range: a stage that is farther from its scale follows another one."""
 LENGTHS, SIZES = 10, 25
 """Numbers of correlation lengths and sizes that are tried."""
 EVENLY = 200
@@ -125,7 +127,7 @@ def likeliest_map(problem: Problem, explanation: Explanation) -> tuple[PositionM
     shortest = spacing if nodes_mm.size < NODES else SMOOTH * history.input_span_mm
     lengths = np.geomspace(shortest, max(history.input_span_mm, 2.0 * shortest), LENGTHS)
     scale = 1.0 / max(float(np.sqrt(np.trace(gram) / nodes_mm.size)), 1e-300)
-    sizes = scale * np.geomspace(0.1, 1e4, SIZES)
+    sizes = np.minimum(scale * np.geomspace(0.1, 1e4, SIZES), LARGEST * history.input_span_mm)
     gains = np.empty((LENGTHS, SIZES))
     roots = []
     straightened = without_line(nodes_mm, _places(history, nodes_mm))

@@ -12,7 +12,7 @@ from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynam
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.record_nuisances import TurningErrors
 from fingervision.diagnosis.noise.replicates import FEWEST_DEGREES, repeats_in, visits
-from fingervision.domain.effect import REZEROED, Array, History
+from fingervision.domain.effect import REZEROED, Array, Flags, History
 from fingervision.domain.errors import DataError
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import Model, PhysicalModel
@@ -72,6 +72,19 @@ def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tup
 UNIT_SHARES = (0.1, 3.0)
 """Smallest and largest share of the model's range that the inputs cover, after a change of unit, if the input was
 apparently given in that unit. Runs cover at least a tenth of the range."""
+UNITS = {
+    "with the opposite sign": -1.0,
+    "in micrometres": 1e3,
+    "in metres": 1e-3,
+    "in tenths of a millimetre": 10.0,
+    "in centimetres": 0.1,
+    "in inches": 1.0 / 25.4,
+}
+"""Factors between a column and one in millimetres, with the words for such a column."""
+THOUSANDS = (1e3, 1e-3)
+"""Factors that leave no doubt: no run is a thousand times as long as the model's range, or a thousandth of it."""
+MODEL_POINTS = 200
+"""Number of inputs at which the range of the model's gap is computed."""
 
 
 def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> Observations:
@@ -83,7 +96,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         If the model does not cover the inputs, or the inputs are in another unit.
     """
     model, function = at_rest_beside(table, model)
-    _refuse_other_inputs(table.input_mm, model.input_range_mm)
+    _refuse_other_inputs(table, model)
     recorded = RecordedInput.of(table, model.base, model.input_range_mm)
     history = _history(table, model, recorded)
     if recorded.log is None:
@@ -119,21 +132,39 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     )
 
 
-def _refuse_other_inputs(input_mm: Array, range_mm: tuple[float, float]) -> None:
+def _refuse_other_inputs(table: MeasuredTable, model: CorrectedModel) -> None:
     """Refuse a table whose inputs are in another unit than the model's, or outside the model's range."""
-    (low, high), span = range_mm, float(np.ptp(input_mm))
-    for factor, unit in ((1e3, "micrometres"), (1e-3, "metres")):
-        if UNIT_SHARES[0] < span / (high - low) / factor < UNIT_SHARES[1]:
-            raise DataError(
-                f"input_mm must be in millimetres within the model's {low:g} to {high:g}, but runs from "
-                f"{input_mm.min():g} to {input_mm.max():g}, as if in {unit}: convert the column."
-            )
-    slack = 1e-9 * (high - low)
-    if input_mm.min() < low - slack or input_mm.max() > high + slack:
+    input_mm, (low, high) = table.input_mm, model.input_range_mm
+    share, runs = float(np.ptp(input_mm)) / (high - low), f"{input_mm.min():g} to {input_mm.max():g}"
+    outside = ~_within(input_mm, low, high)
+    # A run that is mostly within the range is a right one of which the model covers too little.
+    far = float(np.mean(outside)) > 0.5
+    mistakes = [
+        words
+        for words, factor in UNITS.items()
+        if UNIT_SHARES[0] < share / abs(factor) < UNIT_SHARES[1]
+        and (factor in THOUSANDS or (far and _within(input_mm / factor, low, high).all()))
+    ]
+    if far:
+        there = model.base.respond(np.linspace(low, high, MODEL_POINTS)).gap_mm
+        if _within(input_mm, there.min(), there.max()).all() and _within(table.gap_mm, low, high).all():
+            mistakes = ["the columns input_mm and gap_mm were exchanged"]
+    if mistakes:
         raise DataError(
-            f"input_mm must lie within the model's {low:g} to {high:g} mm, but runs from {input_mm.min():g} to "
-            f"{input_mm.max():g}: simulate the missing inputs, or leave those rows out."
+            f"input_mm must be in millimetres within the model's {low:g} to {high:g}, but runs from {runs}, as if "
+            f"{' or '.join(mistakes)}: correct the column."
         )
+    if outside.any():
+        raise DataError(
+            f"input_mm must lie within the model's {low:g} to {high:g} mm, but runs from {runs}: simulate the missing "
+            "inputs, or leave those rows out."
+        )
+
+
+def _within(values: Array, low: float, high: float) -> Flags:
+    """Whether each value lies in a range, or at its ends but for rounding; shape (n,)."""
+    slack = 1e-9 * (high - low)
+    return np.asarray((values >= low - slack) & (values <= high + slack))
 
 
 def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInput) -> History:

@@ -13,7 +13,6 @@ from fingervision.diagnosis.inference.held_out_prediction import left_out_rms_mm
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point
 from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.model_adequacy import strongest_harmonic
-from fingervision.diagnosis.inference.plausibility import Finding
 from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import Answer, verdict
@@ -242,7 +241,7 @@ RUNNERS_UP = 8
 def diagnosis_report(
     answered: Answer,
     posterior: tuple[Point, ...],
-    mistake: Finding | None,
+    mistake: str | None,
     forced: frozenset[str],
     rng: np.random.Generator,
     begin_s: float,
@@ -255,7 +254,7 @@ def diagnosis_report(
         Findings, and the remaining share of the disagreement.
     posterior : tuple of dict
         Posterior draws of the best explanation's parameters, for predicting the next run.
-    mistake : Finding or None
+    mistake : str or None
         Mistake found in the table itself.
     forced : frozenset of str
         Effects that the user requires.
@@ -274,7 +273,7 @@ def diagnosis_report(
     members = tuple(e for e in found.alternatives if e.names)
     alternatives = tuple(_with_map(e.names, mapped=mapped) for e in members) or (((NAME,),) if mapped else ())
     proposal = next_run(data, found.problem, list(members[:MEMBERS_SEPARATED]), posterior, rng)
-    mistaken = mistake is not None and mistake.blocks
+    mistaken = mistake is not None
     harmonic = strongest_harmonic(found.problem, best)
     left = places(data, found.problem, answered.after_mm, np.random.default_rng(LOOKED_AT))
     runners_up = _runners_up(data, found)
@@ -301,7 +300,7 @@ def diagnosis_report(
             *required_words(data, found.problem, best, forced, mapped=mapped),
             *data.notes,
             *data.refitted(),
-            *(() if mistake is None else (mistake.words,)),
+            *(() if mistake is None else (mistake,)),
             *_trend(errors),
             *force_hint(data, found.alternatives),
             *further_evidence(found.alternatives),
