@@ -202,3 +202,14 @@ def test_two_thirds_of_wrong_rows_are_no_noise(tmp_path: Path, offset_mm: float,
     assert report.verdict is Verdict.UNKNOWN
     assert report.effects == ()
     assert "the rows are not one measurement with one noise" in (report.unknown or "")
+
+
+@pytest.mark.parametrize(("share", "agrees"), [(0.1, False), (0.01, True)])
+def test_a_scatter_of_a_tenth_of_the_motion_shows_no_agreement(tmp_path: Path, share: float, agrees: bool) -> None:
+    rng = np.random.default_rng(8)
+    time_s = 0.3 * np.arange(160)
+    u = 1.0 + np.arcsin(np.sin(2.0 * np.pi * time_s / 12.0)) / np.pi
+    gap = GAP_MM + u + share * np.ptp(u) * rng.standard_normal(u.size)
+    report = asked(tmp_path, {"time_s": time_s, "input_mm": u, "gap_mm": gap})
+    assert (report.verdict is Verdict.AGREES) == agrees
+    assert ("too large to tell" in report.sentence) == (not agrees)

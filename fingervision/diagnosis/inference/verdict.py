@@ -34,10 +34,16 @@ FEWEST_ROWS, ENOUGH_ROWS = 20, 100
 """Number of rows below which their own scatter is no noise without repeats, because its relative uncertainty exceeds a
 sixth, and number of rows from which its spectrum tells noise from an error of the model. Between them, neighbouring
 rows must not resemble each other (`resembling`)."""
+MOST_SCATTER = 0.05
+"""Largest ratio of the scatter of the gap to its predicted motion at which a table without effects agrees: ratios of
+the catalogue are at most 0.2 to 0.3, of which a reading at an end of the motion must show half by two standard
+deviations."""
 BY_LUCK = 1.645
 """Standard deviations below its expectation at which von Neumann's ratio is significant at 5 %, one-sided."""
 UNDECIDED = "The table cannot show whether simulation and measurement agree"
 """Beginning of an *unknown* result that found no structure, but no noise either."""
+SCATTERED: str = f"{UNDECIDED}: the gap scatters"
+"""Beginning of one whose noise hides every effect of a usual size."""
 LACK_OF_FIT = 1e-3
 """Significance of the F ratio of lack of fit to pure error above which there is nothing to explain."""
 
@@ -67,6 +73,8 @@ class Standing:
         Rows that were not used.
     noise_is_known : bool
         Whether repeats, a stated uncertainty or enough rows determine the noise, or no digit differs.
+    gap_scatter_mm, gap_motion_mm : float
+        Standard deviation of the residual of the gap, and range of the gap's prediction.
     """
 
     before_mm: float
@@ -78,6 +86,8 @@ class Standing:
     aside_share: float = 0.0
     left_out: tuple[int, ...] = ()
     noise_is_known: bool = True
+    gap_scatter_mm: float = 0.0
+    gap_motion_mm: float = 0.0
 
     @property
     def explained_share(self) -> float:
@@ -145,7 +155,10 @@ def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: A
     gap_mm = _without_scatter(after_mm[:n], runs)[~aside]
     told = kept >= ENOUGH_ROWS or (kept >= FEWEST_ROWS and not resembling(gap_mm, history.input_mm[~aside]))
     known = stated or told
-    return Standing(rms(before_mm), left_mm, noise, kept, degrees, rounding_mm, gross, left_out, known)
+    scatter_mm, motion_mm = float(np.std(gap_mm)), float(np.ptp(data.chain.stacked({})[:n]))
+    return Standing(
+        rms(before_mm), left_mm, noise, kept, degrees, rounding_mm, gross, left_out, known, scatter_mm, motion_mm
+    )
 
 
 def limited_noises_mm(data: Observations, problem: Problem, residual_mm: Array, *, repeated: bool) -> list[float]:
@@ -280,6 +293,13 @@ def verdict(found: Findings, *, mapped: bool, stands: Standing) -> tuple[Verdict
                 f"u_random_mm is stated, and {stands.rows} rows are too few to distinguish noise from an error of the "
                 f"model; the difference is {1e3 * stands.after_mm:.3g} um RMS. Read the positions again, with times, "
                 "or state u_random_mm",
+            )
+        if stands.gap_scatter_mm > MOST_SCATTER * stands.gap_motion_mm:
+            return (
+                Verdict.UNKNOWN,
+                f"{SCATTERED} by {1e3 * stands.gap_scatter_mm:.3g} um about a predicted motion of "
+                f"{1e3 * stands.gap_motion_mm:.3g} um, too large to tell. Find the cause of the scatter first, in the "
+                "pictures of the rows that differ most, or drive a larger range",
             )
         return Verdict.AGREES, None
     if not stands.is_little:

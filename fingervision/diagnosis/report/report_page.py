@@ -7,7 +7,7 @@ import numpy as np
 
 from fingervision.diagnosis.bodies.body_evidence import drawing_of
 from fingervision.diagnosis.diagnose import Diagnosis
-from fingervision.diagnosis.inference.verdict import UNDECIDED
+from fingervision.diagnosis.inference.verdict import SCATTERED, UNDECIDED
 from fingervision.diagnosis.report.figure_files import effect_residual
 from fingervision.diagnosis.report.html_parts import (
     HINT,
@@ -42,6 +42,7 @@ HEADINGS = {
 }
 IN_PART = "A part of the difference has a name, the rest has none"
 UNEXPLAINED = {
+    SCATTERED: "The table scatters too much to tell",
     UNDECIDED: "The table does not show its own noise",
     QUESTION: "A question about the table comes before any name",
 }
