@@ -60,35 +60,40 @@ def draw_deformed(model: MechanismPlate, state: MechanismState, path: Path, *, l
 
 
 def draw_over_input(mechanism: Mechanism, states: Mapping[str, Sequence[MechanismState]], path: Path) -> None:
-    """Plot distances of probe pairs (or single probes), force and stress over the input, for every kind of model."""
-    figure = Figure(figsize=(9.5, 8.5), layout="constrained")
-    upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 2))
+    """Plot distances of probe pairs (or single probes), force and stress over the input, for every kind of model.
+
+    Curves of several kinds coincide, so that what they differ by is plotted beside them.
+    """
+    curves = {kind: _curves(mechanism, rows) for kind, rows in states.items()}
+    chief, first = next(iter(curves.items()))
+    figure = Figure(figsize=(9.5 if len(curves) == 1 else 13.0, 2.8 * len(first)), layout="constrained")
+    panels = figure.subplots(len(first), min(len(curves), 2), sharex=True, squeeze=False)
     for place, (kind, rows) in enumerate(states.items()):
         inputs = [state.input_mm for state in rows]
         style = _STYLES[place % len(_STYLES)]
-        for number, (name, lengths) in enumerate(_lengths(mechanism, rows).items()):
-            still = np.ptp(lengths) < _STILL * max(np.abs(lengths))
-            rest = round(float(np.mean(lengths)), 6) if still else 0.0
-            shown = f"{name} minus {rest:g} mm" if rest else name
-            upper.plot(inputs, np.array(lengths) - rest, style, color=f"C{number}", label=f"{shown} ({kind})")
-        middle.plot(inputs, [state.force_n for state in rows], style, color="0.2", label=kind)
-        for number, name in enumerate(rows[0].drives_n if len(mechanism.drives) > 1 else ()):
-            forces = [state.drives_n[name] for state in rows]
-            middle.plot(inputs, forces, style, color=f"C{number}", label=f"{name} ({kind})")
-        lower.plot(inputs, [state.stress_mpa for state in rows], style, color="0.2", label=kind)
-    upper.set_ylabel("distance / mm" if mechanism.pairs else "displacement / mm")
-    if upper.lines:
-        _beside(upper)
-    middle.set_ylabel("force of the input / N" if len(mechanism.drives) > 1 else "force at the drive / N")
-    _beside(middle)
-    lower.axhline(mechanism.material.yield_mpa, color="C3", linewidth=0.8, linestyle=":")
-    lower.annotate("yield", (1.0, mechanism.material.yield_mpa), xycoords=("axes fraction", "data"), color="C3",
-                   xytext=(-4, -3), textcoords="offset points", ha="right", va="top", fontsize="small")  # fmt: skip
-    lower.set_ylabel("stress in the flexures / MPa")
-    lower.set_xlabel("input / mm")
-    for axes in (upper, middle, lower):
+        for axes, (label, named) in zip(panels, curves[kind].items(), strict=True):
+            for number, (name, values) in enumerate(named.items()):
+                colour = f"C{number - ('' in named)}" if name else "0.2"
+                still = name and np.ptp(values) < _STILL * max(np.abs(values))
+                rest = round(float(np.mean(values)), 6) if still else 0.0
+                shown = f"{name} minus {rest:g} mm" if rest else name
+                axes[0].plot(inputs, values - rest, style, color=colour, label=f"{shown} ({kind})" if name else kind)
+                if place:
+                    axes[1].plot(inputs, values - first[label][name], style, color=colour)
+            axes[0].set_ylabel(label)
+    if len(curves) > 1:
+        panels[0, 1].set_title(f"minus {chief}")
+    for axes in panels[:, 0]:
+        _beside(axes)
+    lowest = panels[-1, 0]
+    lowest.axhline(mechanism.material.yield_mpa, color="C3", linewidth=0.8, linestyle=":")
+    lowest.annotate("yield", (1.0, mechanism.material.yield_mpa), xycoords=("axes fraction", "data"), color="C3",
+                    xytext=(-4, -3), textcoords="offset points", ha="right", va="top", fontsize="small")  # fmt: skip
+    for axes in panels[-1]:
+        axes.set_xlabel("input / mm")
+    for axes in panels.flat:
         axes.grid(alpha=0.3)
-    upper.set_title(f"{mechanism.name}: over the input")
+    panels[0, 0].set_title(f"{mechanism.name}: over the input")
     save_figure(figure, path)
 
 
@@ -100,13 +105,26 @@ def _beside(axes: Axes) -> None:
         axes.legend(fontsize="small")
 
 
-def _lengths(mechanism: Mechanism, rows: Sequence[MechanismState]) -> dict[str, list[float]]:
+def _curves(mechanism: Mechanism, rows: Sequence[MechanismState]) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """Curves of one kind of model by the label of their axis and by name; the name of a whole mechanism's is empty."""
     if mechanism.pairs:
-        return {name: [state.pairs_mm[name] for state in rows] for name in mechanism.pairs}
+        lengths = {name: [state.pairs_mm[name] for state in rows] for name in mechanism.pairs}
+    else:
+        lengths = {
+            f"{name} {axis}": [state.probes_mm[name][place] for state in rows]
+            for name in mechanism.probes
+            for place, axis in enumerate("xy")
+        }
+    forces = {"": [state.force_n for state in rows]}
+    if len(mechanism.drives) > 1:
+        forces |= {name: [state.drives_n[name] for state in rows] for name in rows[0].drives_n}
+    found = {
+        "distance / mm" if mechanism.pairs else "displacement / mm": lengths,
+        "force of the input / N" if len(mechanism.drives) > 1 else "force at the drive / N": forces,
+        "stress in the flexures / MPa": {"": [state.stress_mpa for state in rows]},
+    }
     return {
-        f"{name} {axis}": [state.probes_mm[name][place] for state in rows]
-        for name in mechanism.probes
-        for place, axis in enumerate("xy")
+        label: {name: np.array(values) for name, values in named.items()} for label, named in found.items() if named
     }
 
 

@@ -58,7 +58,7 @@ def begin_drawing(source: Path, out: Path, layer: str, unit_mm: float | None) ->
     low, high = points.min(axis=1), points.max(axis=1)
     make_out_folder(out)
     with out_folder(out):
-        (x0, y0), (x1, y1) = low, high
+        (x0, y0), (x1, y1) = np.round((low, high), 6) + 0.0  # without minus zero
         path = Path(os.path.relpath(source, out)).as_posix()
         how = f"\nlayer = {json.dumps(layer)}" * bool(layer)
         how += "" if unit_mm is None else f"\nunit_mm = {unit_mm:g}"
@@ -75,9 +75,9 @@ def begin_drawing(source: Path, out: Path, layer: str, unit_mm: float | None) ->
     if unit_words:
         click.echo(unit_words)
     click.echo(
-        f"{source.name}: {x1 - x0:.6g} by {y1 - y0:.6g} mm, {len(region.loops)} closed outlines, {len(strips)} strips "
-        f"and notches that are flexures. Complete the lines of {out / name}.toml that begin with #?, with the help of "
-        f"{out / name}.png, then run fingervision model {out / name}.toml."
+        f"{source.name}: {x1 - x0:.6g} by {y1 - y0:.6g} mm, closed outlines: {len(region.loops)}, strips and notches "
+        f"that are flexures: {len(strips)}. Complete the lines that begin with #? of {out / name}.toml with the help "
+        f"of {out / name}.png, then run fingervision model {out / name}.toml."
     )
 
 

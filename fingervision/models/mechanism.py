@@ -505,7 +505,7 @@ def _check_leaf(
             f"flexure {flexure.name} of {name} must have a free length greater than its thickness of {t:g} "
             "mm, but is not; check its length and whether all lengths are millimetres."
         )
-    ends = np.array([flexure.point_mm(s * reach * (1.0 - 1e-6), 0.0) for s in (-1.0, 1.0)]).T
+    ends = np.array([flexure.point_mm(s * reach * (1.0 + 1e-6), 0.0) for s in (-1.0, 1.0)]).T
     leaves = PlanarRegion(tuple(step for other in others if other.kind == "leaf" for step in other.steps()))
     inside = uncut.holds(ends) | leaves.holds(ends)
     if not inside.all():

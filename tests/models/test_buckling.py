@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_figures import mechanism_figures
 from fingervision.storage.mechanism_toml import read_mechanism
 
@@ -72,3 +73,14 @@ def test_leaves_that_bend_do_not_buckle_before_they_yield() -> None:
     assert model.plate.unknowns > 2**15.5
     yields = model.mechanism.material.yield_mpa / model.state(1.0).stress_mpa
     assert np.abs(model.buckling_inputs_mm()).min() > yields
+
+
+@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame])
+def test_a_leaf_that_ends_at_the_bodies_edges_is_one_that_ends_inside(
+    kind: type[MechanismPlate] | type[MechanismFrame], tmp_path: Path
+) -> None:
+    path, forces = tmp_path / "column.toml", []
+    for half_mm in ("30.0", "30.5"):
+        path.write_text(COLUMN.replace("30.5", half_mm).replace("[0, -1]", "[1, 0]"))
+        forces.append(kind(read_mechanism(path)).stiffness_n_mm)
+    assert forces[0] == pytest.approx(forces[1], rel=0.002)
