@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from calib.edge_fit import (
+    MOST_STEPS,
     SMOOTHED_ODDS,
     START_WIDENED,
     EdgeData,
@@ -28,7 +29,8 @@ Floats = NDArray[np.float64]
 
 # Steps after which the best of several starts is chosen; one bin of so many is used for them.
 FIRST_STEPS, COARSE = 7, 3
-# Difference in log evidence beyond which a scene is not tried with further tone curves, which gain less than this.
+# Difference in log evidence beyond which a fit does not go on: from few bins to all, or from one tone curve to further
+# ones, which gain less than this.
 HOPELESS = 20.0
 # Difference of the blurs of inner and outer edges (ln sigma) above which a wall narrower than the blur is possible: it
 # is four times the precision of recordings without a wall.
@@ -75,30 +77,27 @@ def fit_scenes(
     coarse = EdgeData.of(profiles, steps=steps, discrepancy=discrepancy, codec=codec, is_wide=True, every=COARSE)
     narrowest = min(edge_width(profile) for profile in profiles)
 
-    fits = [fitted(family, data, data.start()) for family in families]
-    for scene in scenes:
-        fits += _fits(scene, families, data, coarse, narrowest)
+    plain = [fitted(family, data, data.start()) for family in families]
+    fits = [*plain, *_fits(scenes, families, data, coarse, narrowest)]
     best = max(fits, key=lambda fit: fit.log_evidence)
     smoothed = replace(data, by_pixels=True)
     again = [_refitted(best, smoothed), *(fitted(family, smoothed, smoothed.start()) for family in families)]
     if max(fit.log_evidence for fit in again) - best.log_evidence > SMOOTHED_ODDS:
         data, coarse = smoothed, replace(coarse, by_pixels=True)
-        fits = [*again, *(_refitted(fit, smoothed) for fit in fits if fit is not best)]
+        fits = [*again, *(_refitted(fit, smoothed) for fit in _possible(fits) if fit is not best)]
     best = max(fits, key=lambda fit: fit.log_evidence)
     if scenes is SCENES and float(np.mean(best.misfit)) > LEAVES_MORE:
-        for scene in PAIRS:
-            fits += _fits(scene, families[:1], data, coarse, narrowest)
+        fits += _fits(PAIRS, families[:1], data, coarse, narrowest)
     fits += _less_exact(fits, profiles, discrepancy, steps, codec, by_pixels=data.by_pixels)
-    least = max(fit.log_evidence for fit in fits) - HOPELESS
-    begun = [fit for fit in fits if fit.family is families[0] and (fit.scene is NOTHING or fit.log_evidence > least)]
+    begun = [fit for fit in _possible(fits) if fit.family is families[0]]
     for fit in begun:
         fits += [fitted(each, data, fit.edges, fit.scene, (np.array(each.mean), fit.beside)) for each in others]
     return sorted(fits, key=lambda fit: -fit.log_evidence)
 
 
-def _refitted(fit: EdgeFit, data: EdgeData) -> EdgeFit:
+def _refitted(fit: EdgeFit, data: EdgeData, most_steps: int = MOST_STEPS) -> EdgeFit:
     """The same fit to other data, which begins where it ended."""
-    return fitted(fit.family, data, fit.edges, fit.scene, (fit.parameters, fit.beside))
+    return fitted(fit.family, data, fit.edges, fit.scene, (fit.parameters, fit.beside), most_steps)
 
 
 def _less_exact(
@@ -136,24 +135,39 @@ def _less_exact(
     return found
 
 
+def _possible(fits: Sequence[EdgeFit]) -> list[EdgeFit]:
+    """Plain edges, and the fits that are not hopeless beside the most probable one."""
+    least = max(fit.log_evidence for fit in fits) - HOPELESS
+    return [fit for fit in fits if fit.scene is NOTHING or fit.log_evidence > least]
+
+
 def _fits(
-    scene: Scene, families: Sequence[Family], data: EdgeData, coarse: EdgeData, narrowest_px: float
+    scenes: Sequence[Scene], families: Sequence[Family], data: EdgeData, coarse: EdgeData, narrowest_px: float
 ) -> list[EdgeFit]:
-    """Fits of one scene with each family, from the best of its starts."""
+    """Fits of the scenes with each family: of few bins from every start, of all bins where these are not hopeless."""
     begun = []
-    for own in scene.starts:
-        start = data.start()
-        start[0] = np.log(narrowest_px / START_WIDENED)
-        begin = np.array(families[0].mean), np.array(own)
-        placed = with_placed_edges(families[0], coarse, start, scene, begin)
-        begun.append(fitted(families[0], coarse, placed, scene, begin, FIRST_STEPS))
-    best = max(begun, key=lambda fit: fit.log_evidence)
-    found = []
-    for family in families:
-        parameters = best.parameters if family is families[0] else np.array(family.mean)
-        best = fitted(family, data, best.edges, scene, (parameters, best.beside))
-        found.append(best)
-    return found
+    for scene in scenes:
+        best = max(
+            (_begun(scene, own, families[0], coarse, narrowest_px) for own in scene.starts),
+            key=lambda fit: fit.log_evidence,
+        )
+        begun += [
+            best,
+            *(
+                _refitted(replace(best, family=each, parameters=np.array(each.mean)), coarse, FIRST_STEPS)
+                for each in families[1:]
+            ),
+        ]
+    return [_refitted(fit, data) for fit in _possible(begun)]
+
+
+def _begun(scene: Scene, own: tuple[float, ...], family: Family, coarse: EdgeData, narrowest_px: float) -> EdgeFit:
+    """First steps of a fit of a scene from one of its starts."""
+    start = coarse.start()
+    start[0] = np.log(narrowest_px / START_WIDENED)
+    begin = np.array(family.mean), np.array(own)
+    placed = with_placed_edges(family, coarse, start, scene, begin)
+    return fitted(family, coarse, placed, scene, begin, FIRST_STEPS)
 
 
 def is_more_beside(
