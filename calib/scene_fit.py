@@ -40,6 +40,11 @@ LEAVES_MORE = 1.1
 # Discrepancies of real edges from the models, in units of the usual one, that are tried while more is left: each is as
 # many times less probable as its square. Number of fits that are made again with them, plain edges apart.
 DISCREPANCIES, MOST_AGAIN = (2.0, 4.0, 8.0, 16.0), 4
+# Where real edges differ so: everywhere, on the finger (its texture), or on the ground.
+STRAYS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+# Standard deviation of a bin about the best model, independent of its neighbours (share of the contrast), where edges
+# are as exact as the models.
+EXACT = 0.001
 # Rate of false alarms of the score test, and least information of a direction as a share of the largest.
 FALSE_ALARMS, LEAST_TOLD = 1e-3, 1e-3
 
@@ -95,6 +100,25 @@ def fit_scenes(
     return sorted(fits, key=lambda fit: -fit.log_evidence)
 
 
+def fit_plain(
+    fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile], steps: Sequence[float] = (), codec: float = 0.0
+) -> list[EdgeFit]:
+    """Fits with nothing beside the edges, and these again with edges as exact as the models: they tell the tone curve.
+
+    Parameters
+    ----------
+    fits : sequence of EdgeFit
+        Fits of `fit_scenes`.
+    profiles, steps, codec : sequence of EdgeProfile, sequence of float, float
+        See `fit_scenes`.
+    """
+    plain = sorted((fit for fit in fits if fit.scene is NOTHING), key=lambda fit: fit.log_evidence)
+    data = EdgeData.of(profiles, EXACT, steps=steps, codec=codec, is_wide=True)
+    exact = replace(data, by_pixels=plain[-1].by_pixels)
+    again = [_refitted(fit, exact) for fit in {fit.family.name: fit for fit in plain}.values()]
+    return sorted([*plain, *again], key=lambda fit: -fit.log_evidence)
+
+
 def _refitted(fit: EdgeFit, data: EdgeData, most_steps: int = MOST_STEPS) -> EdgeFit:
     """The same fit to other data, which begins where it ended."""
     return fitted(fit.family, data, fit.edges, fit.scene, (fit.parameters, fit.beside), most_steps)
@@ -113,25 +137,27 @@ def _less_exact(
     found: list[EdgeFit] = []
     best = sorted(fits, key=lambda fit: -fit.log_evidence)
     plain = next(fit for fit in best if fit.scene is NOTHING)
-    tried = [*best[:MOST_AGAIN], *([] if plain in best[:MOST_AGAIN] else [plain])]
-    for times in DISCREPANCIES:
-        is_explained = float(np.mean(tried[0].misfit)) < LEAVES_MORE
-        tried = [fit for fit in tried if fit.scene is NOTHING or not is_explained]
-        if is_explained and all(float(np.mean(fit.misfit)) < LEAVES_MORE for fit in tried):
-            break
-        # A part of what is left is independent from bin to bin, as what the pixels of a sharp edge leave.
-        data = EdgeData.of(
-            profiles,
-            0.5 * times * discrepancy,
-            steps=steps,
-            discrepancy=times * discrepancy,
-            codec=times * codec,
-            is_wide=True,
-        )
-        data = replace(data, by_pixels=by_pixels)
-        tried = [_refitted(fit, data) for fit in tried]
-        tried.sort(key=lambda fit: -fit.log_evidence)
-        found += [replace(fit, log_evidence=fit.log_evidence - 2.0 * float(np.log(times))) for fit in tried]
+    for everywhere, on_finger, on_ground in STRAYS:
+        tried = [*best[:MOST_AGAIN], *([] if plain in best[:MOST_AGAIN] else [plain])]
+        for times in DISCREPANCIES:
+            is_explained = float(np.mean(tried[0].misfit)) < LEAVES_MORE
+            tried = [fit for fit in tried if fit.scene is NOTHING or not is_explained]
+            if is_explained and all(float(np.mean(fit.misfit)) < LEAVES_MORE for fit in tried):
+                break
+            size = times if everywhere else 1.0
+            # A part of what is left is independent from bin to bin, as what the pixels of a sharp edge leave.
+            data = EdgeData.of(
+                profiles,
+                everywhere * 0.5 * size * discrepancy,
+                steps=steps,
+                discrepancy=size * discrepancy,
+                texture=(on_finger * times * discrepancy, on_ground * times * discrepancy),
+                codec=size * codec,
+                is_wide=True,
+            )
+            data = replace(data, by_pixels=by_pixels)
+            tried = sorted(_possible([_refitted(fit, data) for fit in tried]), key=lambda fit: -fit.log_evidence)
+            found += [replace(fit, log_evidence=fit.log_evidence - 2.0 * float(np.log(times))) for fit in tried]
     return found
 
 

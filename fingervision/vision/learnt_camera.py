@@ -42,9 +42,6 @@ NEGATIVE_TAILS = 0.08
 FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15, Coding.INTERFRAME: 0.15}
 # What codecs leave on an edge (see `EdgeData`), from the finest to the coarsest.
 CODECS = (0.0005, 0.001, 0.002, 0.004, 0.008)
-# Probability of nothing beside the edges below which a tone curve does not explain them alone (20:1), and of a rival
-# that still counts.
-UNLIKELY, LEAST_RIVAL = 0.05, 1e-3
 REMEDY = "calibrate with bars of three widths, give the curve with --response, or switch the picture profile off"
 NO_FLANKS = (
     "The camera's response could not be learnt, because no straight flank of a finger shows both its plateaus "
@@ -104,10 +101,8 @@ def learnt_from_profiles(
     # With a stated response, what stands beside the edges is learnt by itself (`learnt_scene`).
     is_known = prior.response.is_known
     scenes, bare = ([], 1.0) if is_known or sight is None else _with_scenes(fits, sight)
-    every = scenes
-    if bare < UNLIKELY:
+    if scenes:
         fits, misfit = scenes, _misfit(scenes)
-        scenes = []
     if misfit > MOST_MISFIT:
         return _not_learnt(prior, MISFIT.format(misfit=misfit), 1.0)
     best = fits[0]
@@ -121,27 +116,31 @@ def learnt_from_profiles(
             max(misfit, 1.0) * float(np.hypot(MODEL_ERROR[coding], best.codec)), None, Origin.LEARNT
         ),
     )
+    used = _alike(fits, sight) if scenes and sight is not None else fits
     if not is_known:
-        camera = _with_response(camera, fits, scenes, coding)
-    if not every or sight is None:
+        camera = _with_response(camera, used, coding)
+    if bare > SURE or sight is None:
         return camera
     if camera.response.curve is assumed:
-        camera = replace(camera, beside=told_beside(every, assumed.name, sight.profiles))
-    u_px = u_of_rivals_px(every, probabilities(every), sight.profiles, camera.response.curve.name)
+        camera = replace(camera, beside=told_beside(fits, assumed.name, sight.profiles))
+    u_px = u_of_rivals_px(fits, used, sight.profiles, camera.response.curve.name)
     return replace(camera, beside=less_sure(camera.beside, u_px))
 
 
-def _with_response(
-    camera: CameraModel, fits: Sequence[EdgeFit], scenes: Sequence[EdgeFit], coding: Coding
-) -> CameraModel:
-    """Camera with the response of the fits; less probable ones with something beside the edges widen what is open."""
-    assumed = camera.response.curve
-    response = _response(fits, coding)
-    rivals = zip(scenes, probabilities(scenes), strict=True) if scenes else ()
-    others = [OtherResponse(fit.response(), float(p)) for fit, p in rivals if p > LEAST_RIVAL and fit.scene.name]
-    response = replace(response, others=(*response.others, *others))
-    if response.curve.white != assumed.white:  # a video of studio range stays clipped at its white
-        response = replace(response, curve=replace(response.curve, white=assumed.white))
+def _alike(fits: Sequence[EdgeFit], sight: FlankSight) -> Sequence[EdgeFit]:
+    """Fits with something beside the edges, or without, whatever is more probable.
+
+    The mean of a curve that explains the edges alone and of one that needs something beside them explains nothing.
+    """
+    told = sum(float(p) for p, fit in zip(probabilities(fits), fits, strict=True) if fit.scene.name)
+    return [fit for fit in fits if fit.scene.name] if told > 0.5 else sight.plain(fits)
+
+
+def _with_response(camera: CameraModel, fits: Sequence[EdgeFit], coding: Coding) -> CameraModel:
+    """Camera with the response of the fits."""
+    white, response = camera.response.curve.white, _response(fits, coding)
+    if response.curve.white != white:  # a video of studio range stays clipped at its white
+        response = replace(response, curve=replace(response.curve, white=white))
     return replace(camera, response=response)
 
 
@@ -166,14 +165,14 @@ def _fitted(profiles: list[EdgeProfile], coding: Coding, tagged: str) -> tuple[l
 
 
 def _with_scenes(fits: Sequence[EdgeFit], sight: FlankSight) -> tuple[list[EdgeFit], float]:
-    """Fits with what may stand beside the edges, and the probability of nothing; none if that is surely so."""
+    """Fits with what may stand beside the edges, and the probability of nothing; none if nothing explains the edges."""
     # A tone curve with free parameters imitates what stands beside the edges.
     if not sight.can_tell or not (fits[0].parameters.size or sight.is_more_beside(fits[0].family)):
         return [], 1.0
     always = [family("linear"), family("srgb")]
     found = sight.fits(always, list(dict.fromkeys(fit.family for fit in fits if fit.family not in always)))
     bare = sum(float(p) for p, fit in zip(probabilities(found), found, strict=True) if not fit.scene.name)
-    return ([], 1.0) if bare > SURE or _misfit(found) > MOST_MISFIT else (found, bare)
+    return ([], 1.0) if _misfit(found) > MOST_MISFIT else (found, bare)
 
 
 def _misfit(fits: Sequence[EdgeFit]) -> float:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import ndtr
 
 from calib.blurred_step import BlurredStep
 from calib.camera_response import CameraResponse
@@ -12,7 +14,7 @@ from calib.edge_fit import EdgeFit
 from calib.edge_profile import EdgeProfile
 from calib.edge_response import UNCOVERED, probabilities
 from calib.edge_scene import SCENES, Scene
-from calib.scene_fit import fit_scenes, is_more_beside
+from calib.scene_fit import fit_plain, fit_scenes, is_more_beside
 from calib.tone_curves import Family, family, fixed_family
 from fingervision.domain.camera import AddedLight, BesideEdges, Origin, ResponseEstimate
 from fingervision.domain.frame import Coding
@@ -39,6 +41,8 @@ BESIDE_PX = 12.0
 SURE = 0.99
 # Extent and spacing of the light that is taken off the lines (pixels), and least weight of a fit that contributes.
 ADDED_PX, ADDED_EVERY_PX, LEAST_WEIGHT = 30.0, 0.1, 1e-3
+# Least standard uncertainty of an alternative (pixels).
+LEAST_U_PX = 1e-6
 # Standard uncertainty of the logarithm of a tip's blur, in general and where light beside the edges widens it.
 U_TIP, U_TIP_LIGHT = 0.15, 0.25
 
@@ -184,6 +188,10 @@ class FlankSight:
         ]
         return sorted(found, key=lambda fit: -fit.log_evidence)
 
+    def plain(self, fits: Sequence[EdgeFit]) -> list[EdgeFit]:
+        """Fits of a tone curve alone, the most probable first; see `fit_plain`."""
+        return fit_plain(fits, self.profiles, STEPS.get(self.coding, ()), self.codec)
+
 
 def _negative(profile: EdgeProfile, response: CameraResponse) -> EdgeProfile:
     light = np.interp(profile.level, response.level, response.light)
@@ -302,38 +310,50 @@ def _added(
     return AddedLight(away, shares, width / seen)
 
 
-def u_of_rivals_px(fits: Sequence[EdgeFit], probability: Floats, profiles: Sequence[EdgeProfile], curve: str) -> float:
+def u_of_rivals_px(
+    fits: Sequence[EdgeFit], used: Sequence[EdgeFit], profiles: Sequence[EdgeProfile], curve: str
+) -> float:
     """Standard uncertainty of the gap, because something beside the edges with another tone curve explains them too.
 
     Parameters
     ----------
     fits : sequence of EdgeFit
         Fits of scenes and tone curves.
-    probability : ndarray of float, shape (fits,)
-        Their probabilities.
+    used : sequence of EdgeFit
+        Fits that told the tone curve.
     profiles : sequence of EdgeProfile
         Profiles of dark fingers.
     curve : str
         Name of the tone curve that is used.
     """
     inner = ~np.array([profile.is_outer for profile in profiles])
-    sums = np.array([fit.at_px[inner].sum() for fit in fits])
-    is_used = np.array([fit.family.name == curve for fit in fits])
-    is_rival = ~is_used & np.array([bool(fit.scene.name) for fit in fits])
-    if not is_used.any():
+    probability, weight = probabilities(fits), probabilities(used)
+    own = [(p, fit.at_px[inner].sum()) for p, fit in zip(weight, used, strict=True) if fit.family.name == curve]
+    rivals = [(p, fit) for p, fit in zip(probability, fits, strict=True) if fit.family.name != curve and fit.scene.name]
+    if not own or not rivals:
         return 0.0
-    used = float(np.average(sums[is_used], weights=np.maximum(probability[is_used], 1e-300)))
-    own = np.sqrt([fit.at_covariance[np.ix_(inner, inner)].sum() for fit in fits])
-    return _covering_u(sums[is_rival] - used, own[is_rival], probability[is_rival])
+    at = float(np.average([each for _, each in own], weights=[max(p, 1e-300) for p, _ in own]))
+    away = np.array([fit.at_px[inner].sum() - at for _, fit in rivals])
+    u_px = np.sqrt([fit.at_covariance[np.ix_(inner, inner)].sum() for _, fit in rivals])
+    return _u_beside(away, u_px, np.array([p for p, _ in rivals]))
 
 
 def _covering_u(away: Floats, own: Floats, probability: Floats) -> float:
-    """Standard deviation of alternatives about a value; at least half of what 95 % of the probability lies within.
+    """Half of what 95 % of the probability of alternatives lies within, about their mean.
 
-    Few alternatives far apart are no normal distribution: of two, the less probable one lies beyond two standard
-    deviations if its probability is below a quarter (JCGM 101:2008, 5.3.4: coverage interval). Each has its own
-    standard uncertainty.
+    Few alternatives far apart are no normal distribution: their standard deviation neither covers the farther ones nor
+    says how sure the others are (JCGM 101:2008, 5.3.4: coverage interval). Each has its own standard uncertainty.
     """
+    own = np.maximum(own, LEAST_U_PX)
+
+    def beyond(half_px: float) -> float:
+        return float(probability @ (ndtr((away - half_px) / own) + ndtr((-away - half_px) / own))) - UNCOVERED
+
+    return 0.5 * float(brentq(beyond, 0.0, np.max(np.abs(away) + 10.0 * own)))
+
+
+def _u_beside(away: Floats, own: Floats, probability: Floats) -> float:
+    """Standard deviation of rivals about a value that is kept; half of where one lies that is not excluded by 20:1."""
     ends = np.abs(away) + 2.0 * own
     order = np.argsort(ends)[::-1]
     farthest = ends[order][np.cumsum(probability[order]) > UNCOVERED]

@@ -116,6 +116,20 @@ def test_the_edge_is_found_beside_what_displaces_a_step(light: Callable[[Floats,
     assert u_px.max() < 0.3
 
 
+@pytest.mark.parametrize("seed", [31, 32, 33, 34])
+def test_brush_marks_on_the_finger_are_no_wall_shadow_or_line(seed: int) -> None:
+    """Marks along the finger stand still in its own frame, so that the mean profile of many rows contains them."""
+    rng = np.random.default_rng(seed)
+
+    def brushed(t: Floats, is_outer: bool) -> Floats:
+        marks = gaussian_filter1d(rng.standard_normal(t.size), 0.9 / FINE_PX)
+        return nothing(t, is_outer) + np.where(t < 0.0, 0.04 * marks / marks.std(), 0.0)
+
+    fits = fit_scenes(profiles(brushed, 0.3, rng), 0.004, [family("linear")])
+    mean = probabilities(fits) @ np.array([fit.at_px for fit in fits])
+    assert np.abs(mean - 0.3).max() < 0.4
+
+
 @pytest.mark.parametrize("width_px", [4.0, 9.0])
 def test_light_that_is_spread_evenly_displaces_nothing(width_px: float) -> None:
     """Motion during the exposure, or a filter of the camera: half of the light on either side, on all flanks alike."""
