@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.errors import FingervisionError
+from fingervision.models.condensed_bodies import CondensedBody
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
-from fingervision.models.mechanism_bodies import MRAD, BodyPose, LinkBody, bodies_of
+from fingervision.models.mechanism_bodies import MRAD, BodyPose, LinkBody, bodies_of, body_weights, rigid_motion
 from fingervision.vision.outline_chunks import REACH_PX, Chunks, FlatMap
 
 Array = NDArray[np.float64]
@@ -21,6 +22,11 @@ that a chunk is usually covered completely or not at all.
 FROM_CORNERS_PX = 4.0
 """Distance of chunks from corners, where the blur of the adjoining edge matters: three times a blur of 1.2 px."""
 BESIDE = 1e-4
+RIGID = 1e-9
+"""Share of a body's largest stiffness below which its frames move as one."""
+OTHER_LOADS = 0.1
+"""How the loads of flexures on a body differ from those of the drawing, relative to them: flexures that are printed or
+cut differ by some per cent in stiffness, as do the model's, and the loads' directions change as the mechanism moves."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,14 +94,15 @@ class Bending:
     model : MechanismFrame
         Elastic model of the drawing.
     moved : ndarray of float, shape (unknowns, k)
-        Its small displacements by each drive, at the input at which its flexures yield.
-    poses : tuple of mapping of str to BodyPose
-        Poses of the moving bodies in each of them; those of fixed bodies are zero.
+        Its small displacements by each drive, at the input at which its flexures yield, and by other loads of the
+        flexures on each body.
+    poses : mapping of str to tuple of BodyPose
+        Pose of every moving body in each of them; those of fixed bodies are zero.
     """
 
     model: MechanismFrame
     moved: Array
-    poses: tuple[Mapping[str, BodyPose], ...]
+    poses: Mapping[str, tuple[BodyPose, ...]]
 
     def of(self, body: LinkBody, chunks: Chunks, place: Placement) -> Chunks:
         """Add to the chunks of a body how each moves outwards as the body bends."""
@@ -107,13 +114,11 @@ class Bending:
             [self.model.motion_mm(self.moved, (x, y), large=False) for x, y in inside_mm.T.tolist()], shape
         )
         x, y = at_mm - body.centroid_mm[:, None]
-        bends = np.zeros((x.size, self.moved.shape[1]))
-        for k, poses in enumerate(self.poses):
-            pose = poses.get(body.name, BodyPose(0.0, 0.0, 0.0))
+        for k, pose in enumerate(self.poses.get(body.name, ())):
             turn = pose.angle_mrad / MRAD
-            rigid = np.stack([pose.x_mm - turn * y, pose.y_mm + turn * x])
-            bends[:, k] = place.px_per_mm * np.sum(outward * (moved_mm[:, :, k].T - rigid), axis=0)
-        return replace(chunks, bends=bends)
+            moved_mm[:, :, k] -= np.stack([pose.x_mm - turn * y, pose.y_mm + turn * x], axis=1)
+        bends = place.px_per_mm * np.einsum("in,nik->nk", outward, moved_mm)
+        return replace(chunks, bends=bends[:, np.any(bends, axis=0)])
 
 
 def bending_of(mechanism: Mechanism) -> Bending | None:
@@ -122,10 +127,36 @@ def bending_of(mechanism: Mechanism) -> Bending | None:
         model = MechanismFrame(mechanism)
         if not model.stiffness_n_mm:  # a drive that bends nothing is refused here, as no input makes flexures yield
             return None
-        moved = model.driven.unit_by_drive * model.input_at_yield_mm
+        driven = model.driven.unit_by_drive * model.input_at_yield_mm
     except FingervisionError:
         return None
-    return Bending(model, moved, tuple(model.drawn_poses(each, large=False) for each in moved.T))
+    moved = np.hstack([driven, *(_by_other_loads(model, body, driven) for body in model.assembly.bodies)])
+    plate = model.plate
+    fields = model.assembly.small_field(moved)
+    nodes = np.stack([fields[plate.x_dofs], fields[plate.y_dofs]])
+    poses = {
+        name: tuple(rigid_motion(plate.nodes_mm, nodes[:, :, k], areas, centroid, large=False)
+                    for k in range(moved.shape[1]))
+        for name, (areas, centroid) in body_weights(plate, model.bodies).items()
+    }  # fmt: skip
+    return Bending(model, moved, poses)
+
+
+def _by_other_loads(model: MechanismFrame, body: CondensedBody, driven: Array) -> Array:
+    """Motions of the frames, shape (unknowns, n), by which one body alone bends in each way that loads can bend it.
+
+    Each way stores the same strain energy. Together they are how far a body bends whose elastic energy is known, but
+    whose loads are not: a normal distribution with the inverse of its stiffness as covariance.
+    """
+    rows = ~np.isin(body.unknowns, model.assembly.held)
+    own = body.unknowns[rows]
+    stiffness = body.stiffness_n_mm[np.ix_(rows, rows)]
+    squares, shapes = np.linalg.eigh(stiffness)
+    is_bent = squares > RIGID * squares[-1]
+    twice_energy = float(np.einsum("ik,ij,jk->", driven[own], stiffness, driven[own]))
+    found = np.zeros((driven.shape[0], int(is_bent.sum())))
+    found[own] = OTHER_LOADS * shapes[:, is_bent] * np.sqrt(twice_energy / squares[is_bent])
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -155,6 +155,9 @@ FEWEST = 6
 LEAST_SHARE = 0.4
 """Least share of the chunks in view whose edge must be found; with fewer, the body is covered by something."""
 LEAST_IN_VIEW = 0.4
+BENDING_ERROR = 0.05
+"""Relative error of how far a chunk moves as its body bends: wrong by a tenth beside the root of a flexure, where the
+model assumes the stress of a beam, and hardly at all farther away."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -328,11 +331,12 @@ def _rigid(
     bends = chunks.bends[used] if chunks.bends.size else np.zeros((nx.size, 0))
     columns = np.hstack([rigid, shared * (view.u_outward_px, view.u_size), doubtful, bends])
     prior = np.diag([0.0] * 3 + [1.0] * (columns.shape[1] - 3))
-    offset, sd = edges.offset[used], np.sqrt(edges.variance[used])
+    offset = edges.offset[used]
     weight = np.ones(offset.size)
-    move = np.zeros(3)
+    move = np.zeros(columns.shape[1])
     scatter = 1.0
     for _ in range(12):
+        sd = np.hypot(np.sqrt(edges.variance[used]), BENDING_ERROR * (bends @ move[move.size - bends.shape[1] :]))
         w = weight / sd**2
         held = rigid.T @ (w[:, None] * rigid)
         size_of = np.sqrt(np.diag(held))

@@ -13,7 +13,7 @@ from fingervision.domain.body_poses import COVERED, DAMAGED, NOT_FOUND, OK
 from fingervision.domain.errors import FingervisionError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
-from fingervision.measuring.body_outlines import Placement, bending_of
+from fingervision.measuring.body_outlines import Placement, bending_of, outlines_of
 from fingervision.measuring.body_poses import BodyTracker
 from fingervision.measuring.drawing_placement import GivenPoint, by_points, by_silhouette, parse_point
 from fingervision.models.finite_element import MechanismPlate
@@ -21,6 +21,8 @@ from fingervision.rendering import Camera, Patch, Scene, render
 from fingervision.rendering.polygon import polygon
 from fingervision.storage.bodies_csv import add_channels, write_bodies
 from fingervision.storage.mechanism_toml import mechanism_from_tables, read_mechanism
+from fingervision.vision.outline_chunks import PLAIN, ChunkEdges
+from fingervision.vision.rigid_outline import _rigid as rigid_motion_of
 from tests.deformed_plate import deformed_outlines
 from tests.diagnosis.lever_drawing import TABLES
 
@@ -63,6 +65,25 @@ def test_the_pose_of_a_body_that_bends_is_that_of_its_area() -> None:
     u_mrad = float(np.hypot(*(np.sqrt(pose.random[2, 2]) for pose in (rest, seen))))
     assert u_mrad < 0.03
     assert seen.angle_mrad - rest.angle_mrad == pytest.approx(lever.state(u).bodies["lever"].angle_mrad, abs=3 * u_mrad)
+
+
+def test_a_ground_that_bends_does_not_displace_the_drawing() -> None:
+    """Its flexures do not load it in exactly the ratio that the model gives them; that must not turn the drawing."""
+    drawing = Path(__file__).parents[1] / "benchmarks" / "mechanisms" / "films" / "lever_jaw.toml"
+    lever, place = MechanismPlate(read_mechanism(drawing)), Placement(13.0, np.zeros(2), 0.0, False)
+    ground = next(outline for outline in outlines_of(lever.mechanism) if outline.body.is_fixed)
+    chunks = ground.chunks(place)
+    moved = 0.8 * lever.driven.unit_displacement
+    inside = place.to_mm(chunks.middles - 1e-3 * chunks.normals)
+    seen = 13.0 * np.array([place.axes @ lever.motion_mm(moved, (x, y), large=False) for x, y in inside.T])
+    offset = np.sum(chunks.normals * seen.T, axis=0)
+    edges = ChunkEdges(offset, *np.full((4, offset.size), [[0.006**2], [1.0], [0.1], [1.0]]),
+                       *np.ones((2, offset.size), dtype=bool))  # fmt: skip
+    motion = rigid_motion_of(chunks, edges, ground.about_px(place), PLAIN)
+    assert motion is not None
+    u = np.sqrt(np.diag(motion[1]))
+    assert np.all(np.abs(motion[0]) < 2.0 * u)
+    assert u[0] < 0.006
 
 
 def test_a_drawing_that_is_not_driven_is_followed_as_rigid_bodies() -> None:
