@@ -42,6 +42,8 @@ NEGATIVE_TAILS = 0.08
 FOREIGN_CURVE = {Coding.LOSSLESS: 0.08, Coding.INTRAFRAME: 0.15, Coding.INTERFRAME: 0.15}
 # What codecs leave on an edge (see `EdgeData`), from the finest to the coarsest.
 CODECS = (0.0005, 0.001, 0.002, 0.004, 0.008)
+# Probability of nothing beside the edges below which a tone curve does not explain them alone (20:1).
+UNLIKELY = 0.05
 REMEDY = "calibrate with bars of three widths, give the curve with --response, or switch the picture profile off"
 NO_FLANKS = (
     "The camera's response could not be learnt, because no straight flank of a finger shows both its plateaus "
@@ -101,7 +103,7 @@ def learnt_from_profiles(
     # With a stated response, what stands beside the edges is learnt by itself (`learnt_scene`).
     is_known = prior.response.is_known
     scenes, bare = ([], 1.0) if is_known or sight is None else _with_scenes(fits, sight)
-    if scenes:
+    if bare < UNLIKELY:
         fits, misfit = scenes, _misfit(scenes)
     if misfit > MOST_MISFIT:
         return _not_learnt(prior, MISFIT.format(misfit=misfit), 1.0)
@@ -116,14 +118,14 @@ def learnt_from_profiles(
             max(misfit, 1.0) * float(np.hypot(MODEL_ERROR[coding], best.codec)), None, Origin.LEARNT
         ),
     )
-    used = _alike(fits, sight) if scenes and sight is not None else fits
+    used = _alike(scenes, sight) if scenes and sight is not None else fits
     if not is_known:
         camera = _with_response(camera, used, coding)
     if bare > SURE or sight is None:
         return camera
     if camera.response.curve is assumed:
-        camera = replace(camera, beside=told_beside(fits, assumed.name, sight.profiles))
-    u_px = u_of_rivals_px(fits, used, sight.profiles, camera.response.curve.name)
+        camera = replace(camera, beside=told_beside(scenes, assumed.name, sight.profiles))
+    u_px = u_of_rivals_px(scenes, used, sight.profiles, camera.response.curve.name)
     return replace(camera, beside=less_sure(camera.beside, u_px))
 
 

@@ -80,7 +80,7 @@ def test_a_camera_that_sharpens_is_not_corrected_and_said(recording: Recording) 
     assert "three widths" in camera.response.words
 
 
-def test_a_response_under_which_no_frame_has_a_gap_is_not_taken() -> None:
+def test_a_response_under_which_hardly_a_frame_has_a_gap_is_not_taken() -> None:
     film = CLASSES["linear-h264"](drawn(1_402_001, 24, SURFACES["glare"]))
     frames, camera = learnt_first(film, SETTINGS, SCALE)
     assert camera.response.curve is SETTINGS.camera.response.curve
