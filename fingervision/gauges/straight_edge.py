@@ -304,6 +304,7 @@ class EdgeFollower:
         self.axes, self.length_px, self.reach_px = axes, length_px, reach_px
         self.at_px, self.polarity = at_px, polarity
         self.slope, self.times, self.most_times = 0.0, 1.0, float(MOST_TIMES)
+        self.missed, self.beside_px = 0, tuple[float, ...]()
         self.first_reach_px = reach_px
         self.known: EdgeFound | None = None
 
@@ -318,7 +319,8 @@ class EdgeFollower:
 
     def lost(self) -> None:
         """Widen the search zone of the next frame, because the edge was not found."""
-        self.times = min(self.times + 1.0, self.most_times) if self.known is not None else 1.0
+        self.missed += self.known is not None
+        self.times = min(1.0 + self.missed, self.most_times)
 
     def candidate(self, picture: Picture) -> tuple[StepCandidate, list[StepCandidate]] | NotFound:
         """The only candidate that may be the edge, together with the other edges beside it."""
@@ -363,25 +365,53 @@ class EdgeFollower:
             )
         if abs(alike[0].position_px) > reach + 1.0:
             return NotFound(GaugeStatus.NO_EDGE, "the edge found is farther away than reach_px")
-        if self.known is None:
-            wide = profile(
-                picture.grey, picture.light, anchor, self.axes.direction_rad, self.slope, self.length_px,
-                ceil(GUARD * MOST_TIMES * self.reach_px) + BEYOND_PX,
-            )  # fmt: skip
-            self.most_times = self._times_clear_of(
-                candidates(wide), replace(alike[0], position_px=alike[0].position_px - off)
+        if self.missed and self._may_be_another(picture, anchor, off, alike[0].position_px, (least, most)):
+            return NotFound(
+                GaugeStatus.AMBIGUOUS,
+                f"since it was found last, {self.missed + 1} frames ago, the edge may have moved so far that this is a "
+                "similar one beside it",
             )
+        if self.known is None:
+            wide = self._wide(picture, anchor)
+            self._note_beside(candidates(wide), replace(alike[0], position_px=alike[0].position_px - off))
         return alike[0], steps
 
-    def _times_clear_of(self, steps: list[StepCandidate], own: StepCandidate) -> float:
-        """Multiple of `reach_px` up to which the search may be widened without including a similar edge."""
+    def _note_beside(self, steps: list[StepCandidate], own: StepCandidate) -> None:
+        """Note where similar edges lie beside the own one, and how far the search may be widened without them."""
         apart = [
-            abs(step.position_px - own.position_px)
+            step.position_px - own.position_px
             for step in steps
             if LEAST_OF_KNOWN <= step.contrast / own.contrast <= MOST_OF_KNOWN
         ]
-        nearest = min((away for away in apart if away > SAME_PX), default=float("inf"))
-        return float(np.clip((nearest - SAME_PX) / (GUARD * self.reach_px), 1.0, MOST_TIMES))
+        self.beside_px = tuple(away for away in apart if abs(away) > SAME_PX)
+        nearest = min(map(abs, self.beside_px), default=float("inf"))
+        self.most_times = float(np.clip((nearest - SAME_PX) / (GUARD * self.reach_px), 1.0, MOST_TIMES))
+
+    def _wide(self, picture: Picture, anchor: tuple[int, int]) -> Profile:
+        """Profile over all places to which the search may be widened."""
+        half = ceil(GUARD * MOST_TIMES * self.reach_px) + BEYOND_PX
+        direction = self.axes.direction_rad
+        return profile(picture.grey, picture.light, anchor, direction, self.slope, self.length_px, half)
+
+    def _may_be_another(
+        self, picture: Picture, anchor: tuple[int, int], off_px: float, at_px: float, contrasts: tuple[float, float]
+    ) -> bool:
+        """Whether an edge here may be one beside the own one, which may have moved by `reach_px` in each frame.
+
+        Then the own one lies where it lay beside that one, and is seen there, or lies out of view.
+        """
+        reach = self.reach_px * min(1 + self.missed, MOST_TIMES)
+        places = [at_px - away - off_px for away in self.beside_px if abs(at_px - away) <= reach]
+        if not places:
+            return False
+        wide = self._wide(picture, anchor)
+        sign = 1 if self.known is None or self.known.contrast > 0.0 else -1
+        seen = [step.position_px for step in candidates(wide) if contrasts[0] <= sign * step.contrast <= contrasts[1]]
+        in_view = wide.weight[np.clip(np.rint(places).astype(int) + wide.half, 0, wide.weight.size - 1)] > 0.5
+        return any(
+            not is_seen or any(abs(place - one) <= SAME_PX for one in seen)
+            for place, is_seen in zip(places, in_view, strict=True)
+        )
 
     def _in_reach(self, steps: list[StepCandidate], reach: float) -> list[StepCandidate]:
         sign = self.polarity if self.known is None else (1 if self.known.contrast > 0.0 else -1)
@@ -410,4 +440,5 @@ class EdgeFollower:
 
     def keep(self, found: EdgeFound) -> None:
         """Store the position of the edge for the next frame."""
-        self.known, self.at_px, self.slope, self.times = found, found.position_px, found.slope, 1.0
+        self.known, self.at_px, self.slope = found, found.position_px, found.slope
+        self.times, self.missed = 1.0, 0

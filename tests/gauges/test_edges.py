@@ -124,6 +124,26 @@ def test_the_neighbour_is_never_taken(tmp_path: Path) -> None:
             assert abs(second[0].quantities[0].in_pixels().value - 60 - jump) < 0.06
 
 
+def test_the_neighbour_is_not_taken_after_a_frame_without_an_edge(tmp_path: Path) -> None:
+    """A comb that moves by up to the stated motion in each frame, one of which shows nothing."""
+    rng = np.random.default_rng(14)
+    period, reach_px = 14.0, 7.0
+    nothing = seen(np.full(SHAPE, 60.0), 2.0, rng)
+    numbers = 0
+    for moved_px in (0.3, 3.0, 12.0, 13.0, 13.8):
+        start, end = (
+            seen(drawn(SHAPE, 60, [(bar(55 + at + k * period, 55, 0.0, 7.0), 160) for k in range(-6, 7)]), 2.0, rng)
+            for at in (0.0, moved_px)
+        )
+        gauges = gauges_of(tmp_path, _edge(0, x_px=58.5, reach_px=reach_px, polarity="falling"))
+        rows = followed(gauges, [start, nothing, end, end])
+        assert rows[0][0].quantities
+        for (reading,) in rows[2:]:
+            numbers += bool(reading.quantities)
+            assert not reading.quantities or abs(reading.quantities[0].in_pixels().value - 58.5 - moved_px) < 0.06
+    assert numbers == 0  # the edge may have moved by a period meanwhile
+
+
 @pytest.mark.parametrize("what", ["wall", "noise", "speckle", "shade", "black", "white"])
 def test_where_there_is_no_edge_there_is_no_number(tmp_path: Path, what: str) -> None:
     rng = np.random.default_rng(11)
