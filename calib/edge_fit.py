@@ -183,7 +183,7 @@ class EdgeData:
         steps: Sequence[float] = (),
         *,
         discrepancy: float = 0.0,
-        texture: tuple[float, float] = (0.0, 0.0),
+        texture: float = 0.0,
         codec: float = 0.0,
         is_wide: bool = False,
         every: int = 1,
@@ -202,8 +202,8 @@ class EdgeData:
             Steps of a codec's quantiser for the eight frequencies across an edge (shares of full scale).
         discrepancy : float
             Standard deviation about the best model that is smooth over a pixel (share of the contrast).
-        texture : (float, float)
-            Standard deviations of what lies on the finger, and on the ground, smooth as well (shares of the contrast).
+        texture : float
+            Standard deviation of what lies on the finger, smooth as well (share of the contrast).
         codec : float
             Standard deviation of what a codec leaves of a plateau's levels (share of the contrast).
         is_wide : bool
@@ -225,12 +225,10 @@ class EdgeData:
             u[e] = scale * np.hypot(u[e], model_error * profile.contrast)
             apart = away[e, :n, None] - away[e, :n]
             covariance = np.diag(u[e, :n] ** 2)
-            on_ground = ndtr(away[e, :n] / (sigma + 0.5))
             covariance += (discrepancy * profile.contrast) ** 2 * np.exp(-0.5 * apart**2)
             # The optics blur a texture of a pixel.
-            smooth = profile.contrast**2 * np.exp(-0.5 * apart**2 / (1.0 + 2.0 * sigma**2))
-            for deviation, seen_at in zip(texture, (1.0 - on_ground, on_ground), strict=True):
-                covariance += deviation**2 * np.outer(seen_at, seen_at) * smooth
+            on_finger = texture * profile.contrast * ndtr(-away[e, :n] / (sigma + 0.5))
+            covariance += on_finger[:, None] * on_finger * np.exp(-0.5 * apart**2 / (1.0 + 2.0 * sigma**2))
             left = (
                 codec
                 * profile.contrast

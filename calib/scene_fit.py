@@ -40,11 +40,8 @@ LEAVES_MORE = 1.1
 # Discrepancies of real edges from the models, in units of the usual one, that are tried while more is left: each is as
 # many times less probable as its square. Number of fits that are made again with them, plain edges apart.
 DISCREPANCIES, MOST_AGAIN = (2.0, 4.0, 8.0, 16.0), 4
-# Where real edges differ so: everywhere, on the finger (its texture), or on the ground.
-STRAYS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-# Standard deviation of a bin about the best model, independent of its neighbours (share of the contrast), where edges
-# are as exact as the models.
-EXACT = 0.001
+# Whether real edges differ so on the finger alone (its texture), or everywhere.
+ON_FINGER = (False, True)
 # Rate of false alarms of the score test, and least information of a direction as a share of the largest.
 FALSE_ALARMS, LEAST_TOLD = 1e-3, 1e-3
 
@@ -93,15 +90,19 @@ def fit_scenes(
     best = max(fits, key=lambda fit: fit.log_evidence)
     if scenes is SCENES and float(np.mean(best.misfit)) > LEAVES_MORE:
         fits += _fits(PAIRS, families[:1], data, coarse, narrowest)
-    fits += _less_exact(fits, profiles, discrepancy, steps, codec, by_pixels=data.by_pixels)
     begun = [fit for fit in _possible(fits) if fit.family is families[0]]
     for fit in begun:
         fits += [fitted(each, data, fit.edges, fit.scene, (np.array(each.mean), fit.beside)) for each in others]
+    fits += _less_exact(fits, profiles, discrepancy, steps, codec, by_pixels=data.by_pixels)
     return sorted(fits, key=lambda fit: -fit.log_evidence)
 
 
 def fit_plain(
-    fits: Sequence[EdgeFit], profiles: Sequence[EdgeProfile], steps: Sequence[float] = (), codec: float = 0.0
+    fits: Sequence[EdgeFit],
+    profiles: Sequence[EdgeProfile],
+    model_error: float,
+    steps: Sequence[float] = (),
+    codec: float = 0.0,
 ) -> list[EdgeFit]:
     """Fits with nothing beside the edges, and these again with edges as exact as the models: they tell the tone curve.
 
@@ -109,11 +110,14 @@ def fit_plain(
     ----------
     fits : sequence of EdgeFit
         Fits of `fit_scenes`.
+    model_error : float
+        Standard deviation of a bin about the best model, independent of its neighbours (share of the contrast), where
+        edges are as exact as the models.
     profiles, steps, codec : sequence of EdgeProfile, sequence of float, float
         See `fit_scenes`.
     """
     plain = sorted((fit for fit in fits if fit.scene is NOTHING), key=lambda fit: fit.log_evidence)
-    data = EdgeData.of(profiles, EXACT, steps=steps, codec=codec, is_wide=True)
+    data = EdgeData.of(profiles, model_error, steps=steps, codec=codec, is_wide=True)
     exact = replace(data, by_pixels=plain[-1].by_pixels)
     again = [_refitted(fit, exact) for fit in {fit.family.name: fit for fit in plain}.values()]
     return sorted([*plain, *again], key=lambda fit: -fit.log_evidence)
@@ -137,21 +141,21 @@ def _less_exact(
     found: list[EdgeFit] = []
     best = sorted(fits, key=lambda fit: -fit.log_evidence)
     plain = next(fit for fit in best if fit.scene is NOTHING)
-    for everywhere, on_finger, on_ground in STRAYS:
+    for on_finger in ON_FINGER:
         tried = [*best[:MOST_AGAIN], *([] if plain in best[:MOST_AGAIN] else [plain])]
         for times in DISCREPANCIES:
             is_explained = float(np.mean(tried[0].misfit)) < LEAVES_MORE
             tried = [fit for fit in tried if fit.scene is NOTHING or not is_explained]
             if is_explained and all(float(np.mean(fit.misfit)) < LEAVES_MORE for fit in tried):
                 break
-            size = times if everywhere else 1.0
+            size = 1.0 if on_finger else times
             # A part of what is left is independent from bin to bin, as what the pixels of a sharp edge leave.
             data = EdgeData.of(
                 profiles,
-                everywhere * 0.5 * size * discrepancy,
+                0.0 if on_finger else 0.5 * size * discrepancy,
                 steps=steps,
                 discrepancy=size * discrepancy,
-                texture=(on_finger * times * discrepancy, on_ground * times * discrepancy),
+                texture=times * discrepancy if on_finger else 0.0,
                 codec=size * codec,
                 is_wide=True,
             )

@@ -303,10 +303,15 @@ class EdgeFollower:
     def __init__(self, axes: Axes, at_px: float, length_px: float, reach_px: float, polarity: int) -> None:
         self.axes, self.length_px, self.reach_px = axes, length_px, reach_px
         self.at_px, self.polarity = at_px, polarity
-        self.slope, self.times, self.most_times = 0.0, 1.0, float(MOST_TIMES)
-        self.missed, self.beside_px = 0, tuple[float, ...]()
+        self.slope, self.missed, self.most_times = 0.0, 0, float(MOST_TIMES)
+        self.beside_px: tuple[float, ...] = ()
         self.first_reach_px = reach_px
         self.known: EdgeFound | None = None
+
+    @property
+    def times(self) -> float:
+        """Multiple of `reach_px` within which the edge is searched."""
+        return min(1.0 + self.missed, self.most_times)
 
     @property
     def zone(self) -> Mark:
@@ -320,7 +325,6 @@ class EdgeFollower:
     def lost(self) -> None:
         """Widen the search zone of the next frame, because the edge was not found."""
         self.missed += self.known is not None
-        self.times = min(1.0 + self.missed, self.most_times)
 
     def candidate(self, picture: Picture) -> tuple[StepCandidate, list[StepCandidate]] | NotFound:
         """The only candidate that may be the edge, together with the other edges beside it."""
@@ -440,5 +444,4 @@ class EdgeFollower:
 
     def keep(self, found: EdgeFound) -> None:
         """Store the position of the edge for the next frame."""
-        self.known, self.at_px, self.slope = found, found.position_px, found.slope
-        self.times, self.missed = 1.0, 0
+        self.known, self.at_px, self.slope, self.missed = found, found.position_px, found.slope, 0

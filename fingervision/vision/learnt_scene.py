@@ -190,7 +190,7 @@ class FlankSight:
 
     def plain(self, fits: Sequence[EdgeFit]) -> list[EdgeFit]:
         """Fits of a tone curve alone, the most probable first; see `fit_plain`."""
-        return fit_plain(fits, self.profiles, STEPS.get(self.coding, ()), self.codec)
+        return fit_plain(fits, self.profiles, MODEL_ERROR[Coding.LOSSLESS], STEPS.get(self.coding, ()), self.codec)
 
 
 def _negative(profile: EdgeProfile, response: CameraResponse) -> EdgeProfile:
