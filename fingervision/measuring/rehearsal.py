@@ -1,5 +1,7 @@
 """Warm-up: measure rendered frames first, so that no real frame is delayed by one-time initialisation."""
 
+from functools import cache
+
 import numpy as np
 
 from fingervision.domain.direction import Direction
@@ -11,8 +13,12 @@ from fingervision.vision.pipeline import Settings, measure_frame
 BELOW_TIP_PX, GAP_PX, FRAME_PX = 10.0, 60.0, (320, 240)
 
 
+@cache
 def rehearse() -> None:
-    """Measure a rendered frame with the tips in every direction, and compute the filter tables for every blur."""
+    """Measure a rendered frame with the tips in every direction, and compute the filter tables for every blur.
+
+    Once in a process: what it initialises stays.
+    """
     for direction in Direction:
         scene = two_fingers(
             GAP_PX, below_tip_px=BELOW_TIP_PX, radius_px=BELOW_TIP_PX, frame=FRAME_PX, direction=direction

@@ -2,6 +2,7 @@
 
 import csv
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,7 +14,9 @@ import pytest
 
 pytest.importorskip("distributed", reason="Dask is not installed: pip install -e '.[cluster]'")
 
+import calib
 from fingervision.batch import cluster as cluster_module
+from fingervision.cli import main
 from fingervision.domain.errors import FingervisionError
 from tests.waiting import free_port
 
@@ -34,15 +37,19 @@ def started(folder: Path, *arguments: str) -> "subprocess.Popen[bytes]":
     return subprocess.Popen(program, cwd=folder, env=ENVIRONMENT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
+def worker(folder: Path, address: str) -> "subprocess.Popen[bytes]":
+    options = ("--host", "127.0.0.1", "--nthreads", "1", "--no-dashboard", "--no-nanny")
+    return started(folder, "dask_worker", address, *options, "--local-directory", str(folder))
+
+
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, "list[subprocess.Popen[bytes]]"]]:
-    """One cluster for all: who kills a worker comes last."""
+    """One cluster for all, with a worker: who needs a second one starts it, and who kills a worker comes last."""
     tmp_path = tmp_path_factory.mktemp("cluster")
     address = f"tcp://127.0.0.1:{free_port()}"
     host, port = "127.0.0.1", address.rpartition(":")[2]
     scheduler = started(tmp_path, "dask_scheduler", "--host", host, "--port", port, "--no-dashboard")
-    options = ("--host", host, "--nthreads", "1", "--no-dashboard", "--no-nanny", "--local-directory", str(tmp_path))
-    workers = [started(tmp_path, "dask_worker", address, *options) for _ in range(2)]
+    workers = [worker(tmp_path, address)]
     try:
         yield address, workers
     finally:
@@ -80,33 +87,29 @@ def test_a_scheduler_that_does_not_answer_is_said() -> None:
 
 
 def test_workers_of_another_version_are_refused(
-    cluster: tuple[str, "list[subprocess.Popen[bytes]]"], recordings: Path, tmp_path: Path
+    cluster: tuple[str, "list[subprocess.Popen[bytes]]"],
+    recordings: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    address, _ = cluster
-    wait_for_workers(address, 2)
+    wait_for_workers(cluster[0], 1)
     # The same code but for one comment: a copy of which the workers know nothing.
-    copy = tmp_path / "copy"
-    for package in ("fingervision", "calib"):
-        for file in (ROOT / package).rglob("*"):
-            if file.is_file() and file.suffix != ".pyc":
-                target = copy / file.relative_to(ROOT)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(file.read_bytes())
-    with (copy / "calib" / "limits.py").open("a", encoding="utf-8") as file:
+    copy = Path(shutil.copytree(ROOT / "calib", tmp_path / "calib"))
+    with (copy / "limits.py").open("a", encoding="utf-8") as file:
         file.write("# Changed.\n")
-    program = [sys.executable, "-m", "fingervision", "batch", "measure", f"{recordings}/**/*.mkv", *SCALE]
-    done = subprocess.run(
-        [*program, "--out", str(tmp_path / "out"), "--scheduler", address],
-        cwd=copy,
-        env={**ENVIRONMENT, "PYTHONPATH": os.pathsep.join([str(copy), ENVIRONMENT["PYTHONPATH"]])},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert "Every worker must have the versions that are installed here, but tcp://127.0.0.1:" in done.stderr
-    assert "source of fingervision" in done.stderr
-    assert "Traceback" not in done.stderr
+    monkeypatch.setattr(calib, "__file__", str(copy / "__init__.py"))
+    cluster_module.versions.cache_clear()
+    asked = ["fingervision", "batch", "measure", f"{recordings}/**/*.mkv", *SCALE, "--out", str(tmp_path / "out")]
+    monkeypatch.setattr(sys, "argv", [*asked, "--scheduler", cluster[0]])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    cluster_module.versions.cache_clear()
+    said = capsys.readouterr().err
+    assert ended.value.code == 1
+    assert "Every worker must have the versions that are installed here, but tcp://127.0.0.1:" in said
+    assert "source of fingervision" in said
+    assert "Traceback" not in said
     assert not (tmp_path / "out").exists()
 
 
@@ -115,6 +118,7 @@ def test_a_cluster_gives_the_same_and_survives_a_dead_worker(
     cluster: tuple[str, "list[subprocess.Popen[bytes]]"], recordings: Path, tmp_path: Path
 ) -> None:
     address, workers = cluster
+    workers.append(worker(tmp_path, address))
     wait_for_workers(address, 2)
     here, there = tmp_path / "here", tmp_path / "there"
     assert batch(tmp_path, f"{recordings}/**/*.mkv", *SCALE, "--out", here).returncode == 3

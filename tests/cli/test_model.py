@@ -11,7 +11,7 @@ from fingervision.cli.model import command
 from fingervision.domain.errors import FingervisionError, InputFileError, OutputError, UsageError
 from fingervision.models.answer_figures import Physics
 from fingervision.models.grip import Part, first_grip_mm
-from fingervision.models.kinds import kinds
+from fingervision.models.kinds import build_model, kinds
 from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
 
@@ -161,6 +161,7 @@ def test_one_kinds_failure_leaves_the_others_their_results(tmp_path: Path, monke
         raise FingervisionError("The outline could not be meshed.")
 
     monkeypatch.setattr(finite_element, "mesh_of", refuse)
+    monkeypatch.setattr("fingervision.interface.prediction.build_model", build_model)  # and not an earlier one's model
     given = drive(tmp_path / "drive.csv", [0.0, 1.0])
     output = run(GRIPPER, "--drive", given, "--out", tmp_path / "o")
     assert "finite_element could not be computed: The outline could not be meshed." in output

@@ -59,7 +59,7 @@ def test_a_drive_is_answered_over_its_time(tmp_path: Path) -> None:
 
 
 def test_the_response_is_a_measured_table(tmp_path: Path) -> None:
-    run(GRIPPER, "--kind", "lumped", "--drive", slow_drive(tmp_path / "drive.csv"), "--out", tmp_path / "o")
+    run(GRIPPER, "--kind", "stiffness_matrix", "--drive", slow_drive(tmp_path / "drive.csv"), "--out", tmp_path / "o")
     measured, simulated = tmp_path / "o" / "response.csv", tmp_path / "o" / "simulation.csv"
     arguments = [str(measured), "--model", str(simulated), "--out", str(tmp_path / "c"), "--json"]
     result = CliRunner().invoke(compare, arguments, catch_exceptions=False)
@@ -161,7 +161,7 @@ def test_a_mechanism_moves_too(tmp_path: Path) -> None:
 )
 def test_wrong_motion_is_refused(tmp_path: Path, options: tuple[str, ...], sentence: str) -> None:
     with pytest.raises(UsageError, match=sentence):
-        run(GRIPPER, "--kind", "lumped", "--out", tmp_path, *options)
+        run(GRIPPER, "--kind", "stiffness_matrix", "--out", tmp_path, *options)
     assert not list(tmp_path.glob("frequency.*"))
     assert not list(tmp_path.glob("modes.*"))
 

@@ -23,7 +23,7 @@ KEYS = {
 def tables(tmp_path: Path) -> tuple[Path, Path]:
     """Tables of a gripper whose gap is 0.1 mm too large, in two runs."""
     rng = np.random.default_rng(SEED)
-    u = np.concatenate([np.linspace(-0.4, 1.4, 60), np.linspace(1.4, -0.4, 60)])
+    u = np.concatenate([np.linspace(-0.4, 1.4, 30), np.linspace(1.4, -0.4, 30)])
     rows = []
     for run in range(2):
         gap = 4.1 + 7.7 * u + 0.01 * rng.standard_normal(u.size)

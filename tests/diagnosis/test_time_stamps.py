@@ -15,7 +15,7 @@ from fingervision.motion.time_stamps import frame_resolution_s, input_error_of_s
 from fingervision.storage.measured_table import read_measured_table
 
 RATE_HZ, MOTION_HZ, STROKE_MM, SLOPE = 120.0, 3.1, 0.3, 7.72
-NOISE_MM, LOG_NOISE_MM, RESOLUTION_S = 5e-4, 1e-5, 1e-3
+NOISE_MM, LOG_NOISE_MM, RESOLUTION_S, FILMED_S = 5e-4, 1e-5, 1e-3, 1.6
 MODEL = {"input_mm": [-0.1, 0.6], "gap_mm": [1.0 - 0.1 * SLOPE, 1.0 + 0.6 * SLOPE]}
 
 
@@ -27,9 +27,9 @@ def filmed(play_mm: float, seed: int, log_noise_mm: float = LOG_NOISE_MM) -> Mea
         turns = MOTION_HZ * np.maximum(time_s - 0.4, 0.0)
         return np.asarray(0.5 * STROKE_MM * (1.0 - np.cos(2.0 * np.pi * turns)))
 
-    time_s = np.arange(int(2.7 * RATE_HZ)) / RATE_HZ
+    time_s = np.arange(int(FILMED_S * RATE_HZ)) / RATE_HZ
     stamps_s = np.round(time_s, 3)
-    fine_s = np.arange(0.0, 2.7, 2e-4)
+    fine_s = np.arange(0.0, FILMED_S, 2e-4)
     moved = np.interp(time_s, fine_s, play(driven(fine_s), play_mm, 0.0) if play_mm else driven(fine_s))
     return measured_from_columns(
         {

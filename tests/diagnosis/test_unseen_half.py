@@ -22,7 +22,9 @@ from fingervision.models.table import TableModel
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from tests.benchmarks.hidden import rows
-from tests.benchmarks.hidden.table_cache import draw_table_of_row
+from tests.benchmarks.hidden.experiment import draw_experiment
+from tests.benchmarks.hidden.experiment_files import write
+from tests.benchmarks.hidden.table_cache import TRIES
 
 ROWS, NOISE_MM = 60, 0.002
 
@@ -90,7 +92,7 @@ def test_the_sentence_on_what_was_tried_names_what_explains_a_part() -> None:
 
 def test_a_half_that_determines_nothing_refutes_nothing(tmp_path: Path) -> None:
     # Half of this table leaves the radius of a large deflection open by its hundredfold.
-    draw_table_of_row(rows.ROWS["poor"], 1491, 0, tmp_path)
+    write(draw_experiment(1491 * 10_000 * TRIES, rows.ROWS["poor"]), tmp_path)
     done = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "simulation.csv"))
     assert done.report.verdict is Verdict.NAMED
     assert done.report.alternatives == (("large_deflection",),)

@@ -80,7 +80,7 @@ def test_what_is_no_mark_has_no_number(tmp_path: Path, what: str) -> None:
     rng = np.random.default_rng(44)
     gauges = gauges_of(tmp_path, *(_mark(shape) for shape in ("dot", "cross", "corner")))
     numbers = 0
-    for _ in range(4):
+    for _ in range(2):
         light = {
             "wall": lambda: np.full(SHAPE, 120.0),
             "noise": lambda: rng.normal(120, 40, SHAPE),

@@ -39,7 +39,7 @@ def test_a_generator_gives_the_numbers_of_the_array() -> None:
 
 
 def test_a_generator_of_any_length_needs_the_memory_of_a_few_pictures() -> None:
-    learnt, held = 60, []  # the camera is learnt from pictures before this one, and they are let go
+    learnt, held = 20, []  # the camera is learnt from pictures before this one, and they are let go
 
     def watched() -> Iterator[np.ndarray]:
         for index, picture in enumerate(pictures(learnt + 40)):

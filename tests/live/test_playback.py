@@ -83,7 +83,7 @@ def test_every_frame_is_the_one_it_says_in_any_order(recordings: dict[str, Path]
     whole = [item for item in source if isinstance(item, Frame)]
     assert [number_in(item.pixels) for item in whole] == list(range(FRAMES))
     reader = FrameReader(lambda: iter(source), str(recordings[name]))
-    order = [0, FRAMES - 1, 30, 29, 28, 5, 6, 7, *Random(1).sample(range(FRAMES), 25)]
+    order = [0, FRAMES - 1, 30, 29, 28, 5, 6, 7, *Random(1).sample(range(FRAMES), 10)]
     for wanted in order:
         # Asked for by its time where the table has one, and by counting.
         for time_s in (whole[wanted].time_s, None):

@@ -1,5 +1,6 @@
 """Buckling of leaves: Euler's columns, and mechanisms whose leaves bend and do not buckle."""
 
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 
@@ -7,10 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from fingervision.models.elastic_mechanism import ElasticMechanism
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_figures import mechanism_figures
 from fingervision.storage.mechanism_toml import read_mechanism
+from tests.models.coarse import coarse_elements
 
 COLUMN = """
 plate_mm = 2.0
@@ -49,7 +52,7 @@ FREE = brentq(lambda x: x * np.tan(x) - LENGTH / HEAD, 0.1, 1.5) ** 2
 def test_a_column_buckles_at_the_force_of_euler(ends: str, factor: float, tmp_path: Path) -> None:
     path = tmp_path / "column.toml"
     path.write_text(COLUMN + ends + "\nforce_n_per_input = 0.1\n")
-    model = MechanismPlate(read_mechanism(path))
+    model = coarse_elements(read_mechanism(path))
     _, pushed = model.buckling_inputs_mm()
     # The elastic bodies let the ends of the leaf turn a little: it is longer by about its thickness.
     assert 0.1 * pushed == pytest.approx(factor * STIFFNESS / (LENGTH + 0.4) ** 2, rel=0.01)
@@ -58,7 +61,7 @@ def test_a_column_buckles_at_the_force_of_euler(ends: str, factor: float, tmp_pa
 def test_a_column_pushed_by_a_stage_buckles_at_the_same_force(tmp_path: Path) -> None:
     path = tmp_path / "column.toml"
     path.write_text(COLUMN + 'across = "held"\n')
-    model = MechanismPlate(read_mechanism(path))
+    model = coarse_elements(read_mechanism(path))
     pushed = model.buckling_inputs_mm()[1]
     assert mechanism_figures(model)["input_at_buckling_mm"] == pytest.approx(pushed)
     force = pushed * model.stiffness_n_mm
@@ -75,9 +78,9 @@ def test_leaves_that_bend_do_not_buckle_before_they_yield() -> None:
     assert np.abs(model.buckling_inputs_mm()).min() > yields
 
 
-@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame])
+@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame])
 def test_a_leaf_that_ends_at_the_bodies_edges_is_one_that_ends_inside(
-    kind: type[MechanismPlate] | type[MechanismFrame], tmp_path: Path
+    kind: Callable[..., ElasticMechanism], tmp_path: Path
 ) -> None:
     path, forces = tmp_path / "column.toml", []
     for half_mm in ("30.0", "30.5"):

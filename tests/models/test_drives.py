@@ -1,5 +1,6 @@
 """What a driven face may do, against structured quadrilaterals of second order that share nothing with the models."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +11,14 @@ from scipy.sparse.linalg import spsolve
 from skfem.helpers import ddot, eye, sym_grad, trace
 
 from fingervision.domain.errors import DataError, ModelError
-from fingervision.models.finite_element import MechanismPlate
+from fingervision.models.elastic_mechanism import ElasticMechanism
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Face, Mechanism
 from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.mechanism_toml import read_mechanism
+from tests.models.coarse import coarse_elements
 
+Kind = Callable[..., ElasticMechanism]
 E, NU, PLATE_MM = 1000.0, 0.3, 2.0
 ROD = 'across = "free"'
 FORCE = 0.007
@@ -92,7 +95,7 @@ def quadrilaterals_n_mm(x0: float, x1: float, *, held: bool) -> float:
 def test_a_face_across_its_drive(tmp_path: Path, turns: str, box: str, x0: float) -> None:
     drawn = lever(tmp_path, box, f'across = "free"\nturns = "{turns}"')
     expected = quadrilaterals_n_mm(x0, 50.0, held=turns == "held")
-    for kind in (MechanismPlate, MechanismFrame):
+    for kind in (coarse_elements, MechanismFrame):
         assert kind(drawn, width_effect=False).stiffness_n_mm == pytest.approx(expected, rel=FORCE)
 
 
@@ -101,7 +104,7 @@ def test_a_rod_that_pushes_does_not_clamp_whichever_way_the_face_lies(tmp_path: 
     stiffer = []
     for box in ("40, 50, 10, 10", "60, 60, 0, 10"):
         free = lever(tmp_path, box, 'across = "free"')
-        plate, chain = MechanismPlate(free, width_effect=False), RigidBodies(free)
+        plate, chain = coarse_elements(free, width_effect=False), RigidBodies(free)
         arms = {"40, 50, 10, 10": 45.0, "60, 60, 0, 10": 60.0}[box]
         inertia = PLATE_MM / 12.0
         # Deflection at the arm by the moment P (arm - x) along the leaf from 10 to 20 mm.
@@ -128,13 +131,13 @@ def test_what_a_drive_cannot_do_is_refused(tmp_path: Path) -> None:
         lever(tmp_path, "40, 50, 10, 10", 'turns = "often"')
 
 
-@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame, RigidBodies])
+@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame, RigidBodies])
 @pytest.mark.parametrize(("box", "more"), [
     ("5, 10, 10, 10", ""),  # the foot, which is clamped
     ("40, 50, 10, 10", "[[slide]]\nname = 'rail'\nbox_mm = [59, 60, 0, 0]\nholds = 'y'\n"
                        "[[slide]]\nbox_mm = [20, 21, 10, 10]\nholds = 'y'"),
 ])  # fmt: skip
-def test_a_drive_whose_body_is_held_is_refused_with_its_place(tmp_path: Path, kind: type, box: str, more: str) -> None:
+def test_a_drive_whose_body_is_held_is_refused_with_its_place(tmp_path: Path, kind: Kind, box: str, more: str) -> None:
     stuck = lever(tmp_path, box, f"{ROD}\n{more}")
     with pytest.raises((DataError, ModelError), match=r"drive of .* must be able to move its body") as refused:
         kind(stuck).state(1.0)
@@ -143,8 +146,8 @@ def test_a_drive_whose_body_is_held_is_refused_with_its_place(tmp_path: Path, ki
         assert ("rail" if more else "fixed 1") in str(refused.value)
 
 
-@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame, RigidBodies])
-def test_a_drive_that_moves_everything_is_refused(tmp_path: Path, kind: type) -> None:
+@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame, RigidBodies])
+def test_a_drive_that_moves_everything_is_refused(tmp_path: Path, kind: Kind) -> None:
     """A rail in place of the clamp: the drive pushes the whole mechanism along it."""
     free = lever(tmp_path, "60, 60, 0, 10", 'across = "held"').drives[0]
     drawn = lever(tmp_path, "60, 60, 0, 10", 'across = "held"')
@@ -153,8 +156,8 @@ def test_a_drive_that_moves_everything_is_refused(tmp_path: Path, kind: type) ->
         _ = kind(railed).stiffness_n_mm
 
 
-@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame])
-def test_a_clamp_on_a_flexure_is_refused_with_its_place(tmp_path: Path, kind: type) -> None:
+@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame])
+def test_a_clamp_on_a_flexure_is_refused_with_its_place(tmp_path: Path, kind: Kind) -> None:
     drawn = lever(tmp_path, "60, 60, 0, 10", ROD)
     held = replace(drawn, fixed=(Face("jaws", (0.0, 13.0, 0.0, 10.0)),))
     with pytest.raises(DataError, match=r"fixed face jaws of .* holds flexure leaf at \(1[12]\.?\d*, [45]\.5\) mm"):
@@ -165,11 +168,11 @@ def test_a_clamp_on_a_flexure_is_refused_with_its_place(tmp_path: Path, kind: ty
 def test_drives_and_rails_that_agree_with_a_rigid_motion_are_computed(tmp_path: Path) -> None:
     """A rail across the drive, and a second drive that moves the body the same way, hold nothing."""
     beside = "[[slide]]\nbox_mm = [60, 60, 5, 5.5]\nholds = 'x'"
-    assert MechanismPlate(lever(tmp_path, "40, 50, 10, 10", f"{ROD}\n{beside}")).stiffness_n_mm > 0.0
+    assert coarse_elements(lever(tmp_path, "40, 50, 10, 10", f"{ROD}\n{beside}")).stiffness_n_mm > 0.0
     both = f"{ROD}\nname = 'left'\n[[drive]]\nname = 'right'\nbox_mm = [52, 58, 10, 10]\ndirection = [0, 1]\n{ROD}"
     path = tmp_path / "mechanism.toml"
     path.write_text(LEVER.replace("[drive]", "[[drive]]").format(box="40, 50, 10, 10", how=both))
-    assert MechanismPlate(read_mechanism(path)).stiffness_n_mm > 0.0
+    assert coarse_elements(read_mechanism(path)).stiffness_n_mm > 0.0
 
 
 def test_a_body_that_bends_at_a_part_without_a_name_is_not_held(tmp_path: Path) -> None:
@@ -180,7 +183,7 @@ def test_a_body_that_bends_at_a_part_without_a_name_is_not_held(tmp_path: Path) 
     text = LEVER.replace('[[body]]\nname = "foot"\nbox_mm = [0, 10, 0, 10]\n', bodies)
     path = tmp_path / "mechanism.toml"
     path.write_text(text.format(box="35.5, 40, -40, -39", how=ROD))
-    curved = MechanismPlate(read_mechanism(path))
+    curved = coarse_elements(read_mechanism(path))
     assert 0.0 < curved.stiffness_n_mm < 10.0
 
 
@@ -190,18 +193,18 @@ def test_the_stated_error_holds_wedges_of_a_wide_plate(
 ) -> None:
     """Force of CalculiX's quadratic wedges, three layers through half the plate; plane stress alone is too soft."""
     drawn = replace(lever(tmp_path, "59, 60, 10, 10", ROD), plate_mm=plate_mm)
-    for kind in (MechanismPlate, MechanismFrame):
+    for kind in (coarse_elements, MechanismFrame):
         model = kind(drawn)
         assert model.stiffness_n_mm == pytest.approx(wedges_n_mm, rel=model.force_error)
         assert model.in_plane_stress.stiffness_n_mm < (1.0 - narrower) * wedges_n_mm
 
 
 SOFT_N_MM = 0.5
-KINDS = (MechanismPlate, MechanismFrame, RigidBodies)
+KINDS = (coarse_elements, MechanismFrame, RigidBodies)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_actuator_with_a_stiffness_is_a_spring_in_series(tmp_path: Path, kind: type) -> None:
+def test_an_actuator_with_a_stiffness_is_a_spring_in_series(tmp_path: Path, kind: Kind) -> None:
     stage = kind(lever(tmp_path, "40, 50, 10, 10", ROD))
     soft = kind(lever(tmp_path, "40, 50, 10, 10", f"{ROD}\nstiffness_n_mm = {SOFT_N_MM}")).state(2.0)
     own = stage.stiffness_n_mm
@@ -216,7 +219,7 @@ def test_an_actuator_with_a_stiffness_is_a_spring_in_series(tmp_path: Path, kind
 
 def test_a_force_and_a_motion_give_the_same_deformed_shape(tmp_path: Path) -> None:
     """The equilibrium with the force of a stage at 4 mm has its face at 4 mm, by both kinds in large rotation."""
-    for kind in (MechanismPlate, MechanismFrame):
+    for kind in (coarse_elements, MechanismFrame):
         stage = kind(lever(tmp_path, "40, 50, 10, 10", ROD)).state(4.0, large_rotation=True)
         force = kind(lever(tmp_path, "40, 50, 10, 10", f"{ROD}\nforce_n_per_input = 1.0"))
         pushed = force.state(stage.force_n, large_rotation=True)
@@ -255,7 +258,7 @@ def pinned(folder: Path, how: str) -> Mechanism:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_pin_turns_the_lever_as_a_rod_at_its_arm_does(tmp_path: Path, kind: type) -> None:
+def test_a_pin_turns_the_lever_as_a_rod_at_its_arm_does(tmp_path: Path, kind: Kind) -> None:
     """On the leaf's axis, a pin that cannot slide does not hold the lever either."""
     rod = kind(lever(tmp_path, "40, 50, 10, 10", ROD)).stiffness_n_mm
     for across in ("free", "held"):
@@ -285,7 +288,7 @@ flexure = [{ name = "h", kind = "leaf", at_mm = [21, 0], axis_deg = 0, thickness
 """
     (tmp_path / "beam.toml").write_text(text)
     mechanism = read_mechanism(tmp_path / "beam.toml")
-    for kind in (MechanismFrame, MechanismPlate):
+    for kind in (MechanismFrame, coarse_elements):
         plane = kind(mechanism, width_effect=False)
         assert plane.stiffness_n_mm == pytest.approx(3.0 * 70000.0 * 5.0 / 12.0 / 19.5**3, rel=0.02)
 
@@ -318,8 +321,8 @@ def held_body(folder: Path, arm_mm: float, across_mm: float) -> Mechanism:
     return read_mechanism(folder / "held.toml")
 
 
-@pytest.mark.parametrize("kind", [MechanismPlate, MechanismFrame])
-def test_a_bent_strip_is_as_slender_as_a_straight_one(tmp_path: Path, kind: type) -> None:
+@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame])
+def test_a_bent_strip_is_as_slender_as_a_straight_one(tmp_path: Path, kind: Kind) -> None:
     """An L of 8 by 8 mm is a beam of 14 by 2 mm: of both arms' bending, 3 E I / (b^3 + 3 a b^2)."""
     a, b = 7.0, 6.5
     beam_n_mm = 3.0 * 70000.0 * 5.0 * 2.0**3 / 12.0 / (b**3 + 3.0 * a * b**2)

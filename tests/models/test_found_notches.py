@@ -17,6 +17,7 @@ from fingervision.models.strips import necks_of
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import read_mechanism
 from fingervision.storage.outline_file import write_outline
+from tests.models.coarse import coarse_elements
 
 ezdxf = pytest.importorskip("ezdxf")
 pytest.importorskip("svgelements")
@@ -113,7 +114,7 @@ of = ["left", "right"]
         assert own.thickness_mm == pytest.approx(hinge.thickness_mm, rel=1e-4)
         assert own.half_length_mm == pytest.approx(hinge.half_length_mm, rel=1e-4)
         assert abs(np.sin(np.radians(own.axis_deg - hinge.axis_deg))) < 1e-4
-    for kind in (MechanismPlate, MechanismFrame) if ending == "dxf" else ():
+    for kind in (coarse_elements, MechanismFrame) if ending == "dxf" else ():
         ours, theirs = kind(again), kind(whole)
         assert ours.stiffness_n_mm == pytest.approx(theirs.stiffness_n_mm, rel=0.002)
         ratios = [model.state(0.1).pairs_mm["gap"] - model.state(0.0).pairs_mm["gap"] for model in (ours, theirs)]
@@ -185,7 +186,7 @@ def test_a_short_neck_between_fillets_is_a_flexure(tmp_path: Path) -> None:
     again, named = read_again(tmp_path, SHORT), drawn(tmp_path, BEAM + SHORT)
     (strip,) = again.strips
     assert (strip.thickness_mm, strip.half_length_mm, strip.fillet_mm) == pytest.approx((1.0, 2.0, 1.5))
-    for kind in (MechanismPlate, MechanismFrame):
+    for kind in (coarse_elements, MechanismFrame):
         assert kind(again).stiffness_n_mm == pytest.approx(kind(named).stiffness_n_mm, rel=1e-3)
 
 

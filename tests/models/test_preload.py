@@ -1,6 +1,7 @@
 """Preload of a drive, against the beam-column of exact theory and the same mechanism moved by its drive."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,12 @@ from click.testing import CliRunner
 from fingervision.cli.model import command
 from fingervision.domain.errors import ModelError
 from fingervision.models.elastic_mechanism import ElasticMechanism
-from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import mechanism_figures, response_figures
 from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.mechanism_toml import read_mechanism
+from tests.models.coarse import coarse_elements
 
 HEAD = """
 plate_mm = 4.0
@@ -99,10 +100,6 @@ RIGIDITY_N_MM2 = 70000.0 * 4.0 * 0.5**3 / 12.0
 Kind = Callable[[Mechanism], ElasticMechanism]
 
 
-def coarse_elements(mechanism: Mechanism) -> MechanismPlate:
-    return MechanismPlate(mechanism, refine=0.5)
-
-
 def drawn(folder: Path, text: str) -> Mechanism:
     path = folder / "mechanism.toml"
     path.write_text(HEAD + text)
@@ -135,7 +132,7 @@ def test_a_leaf_under_a_weight_is_the_beam_column(tmp_path: Path, kind: Kind) ->
         assert falls == pytest.approx(np.sqrt(model.stiffness_n_mm / bare.stiffness_n_mm), rel=0.002)
 
 
-@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame])
+@pytest.mark.parametrize("kind", [partial(coarse_elements, refine=0.5), MechanismFrame], ids=["elements", "frame"])
 def test_a_preload_states_its_force_sag_and_stress(tmp_path: Path, kind: Kind) -> None:
     """A weight on a straight leaf shortens it by P L / (E A), and the bodies a little, at a stress of P / A.
 

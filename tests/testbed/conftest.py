@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.models.kinds import GripperModel, build_model
 from fingervision.testbed.bed import Bed
 from fingervision.testbed.bed_factory import open_bed
 from fingervision.testbed.manual import manual_control
 from fingervision.testbed.serial_port import opened_port
+from tests.one_model_each import one_model_each
 from tests.testbed.board_bed import CONTRACT_STEPS, times_of, written_bed
 from tests.testbed.emulated_board import EmulatedBoard, MotorController, compiled, missing_tools, running
 
@@ -20,18 +20,15 @@ SLOWER = 3
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_model_of_each_gripper() -> Iterator[None]:
-    """Build the model of a gripper once, which takes as long as the rest of opening a test bed."""
-    known: list[tuple[object, GripperModel]] = []
+    with one_model_each("fingervision.testbed.bed_factory.build_model"):
+        yield
 
-    def build(*given: object) -> GripperModel:
-        found = next((model for before, model in known if before == given), None)
-        if found is None:
-            found = build_model(*given)  # type: ignore[arg-type]
-            known.append((given, found))
-        return found
 
+@pytest.fixture(scope="session", autouse=True)
+def _cameras_are_learnt_in_this_process() -> Iterator[None]:
+    """Another process gives the same camera (test_camera_learning.py) and starts in more time than it learns it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fingervision.testbed.bed_factory.build_model", build)
+        patch.setattr("fingervision.measuring.camera_learning.in_own_process", lambda work, *given: work(*given))
         yield
 
 

@@ -25,7 +25,7 @@ TOP = Path(__file__).resolve().parents[2]
 DROPS = TOP.parent / "shared" / "real" / "drops"
 PX_PER_MM = 34.0
 SURE = 0.999
-FRAMES = 60
+FRAMES = 40
 # The classes whose errors are told as one sample. A slanted tip is known far less surely: blur hides its corner's
 # radius, and all that it may be is in the uncertainty.
 POOLED = ("straight", "rounded", "blur_3", "mixed")
