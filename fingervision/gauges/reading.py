@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
 from fingervision.gauges.quantities import Quantity
 
@@ -34,8 +33,8 @@ MEANING = {
     GaugeStatus.OUT_OF_VIEW: "the measured object, or a necessary part of it, lies outside the picture",
     GaugeStatus.NO_EDGE: "no straight edge with this polarity and contrast lies in the searched zone",
     GaugeStatus.NOT_FOUND: "no matching object lies in the searched zone",
-    GaugeStatus.AMBIGUOUS: "more than one matching object lies in the searched zone: reduce reach_px, state the "
-    "polarity, or move the gauge",
+    GaugeStatus.AMBIGUOUS: "more than one matching object lies in the searched zone, or a similar one may have come "
+    "from beside it: reduce reach_px, state the polarity, or move the gauge",
     GaugeStatus.LOW_CONTRAST: "the object has too little contrast or texture to be measured",
     GaugeStatus.SATURATED: "the flank of the edge is clipped at the end of the scale",
     GaugeStatus.BLURRED: "the blur of the edge exceeds 5 px (standard deviation)",
@@ -79,19 +78,3 @@ class Reading:
     marks: tuple[Mark, ...] = ()
     zone: Mark | None = field(default=None)
     words: str = ""
-
-
-def unread(frame: object, status: Status, gauges: int) -> list[Reading]:
-    """Readings of all gauges in a frame whose picture is lost or rejected: no values, with the frame's reason.
-
-    Parameters
-    ----------
-    frame : Frame or LostFrame
-        The frame; a lost frame states its reason.
-    status : Status
-        Status of the frame.
-    gauges : int
-        Number of gauges.
-    """
-    words = frame.words if isinstance(frame, LostFrame) else ""
-    return [Reading(GaugeStatus(status.value), words=words)] * gauges

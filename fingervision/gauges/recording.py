@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from fingervision.domain.camera import CameraModel
 from fingervision.domain.frame import Frame, LostFrame, Pixels
 from fingervision.gauges.gauge_file import Gauge, check_gauges
-from fingervision.gauges.kinds import measured_together
+from fingervision.gauges.kinds import measured_together, unread
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
 from fingervision.gauges.quantities import Cell
-from fingervision.gauges.reading import GaugeStatus, Mark, Reading, unread
+from fingervision.gauges.reading import GaugeStatus, Mark, Reading
 from fingervision.measuring.scale import Scale
 from fingervision.storage.gauge_files import GaugeRow, GaugeRows, GaugesCsv
 from fingervision.vision.overlay import in_eight_bits
@@ -180,7 +180,7 @@ class GaugeRecording:
         lost = outcome if isinstance(outcome, LostFrame) else frame
         readings: Sequence[Reading]
         if isinstance(lost, LostFrame):
-            readings = unread(lost, lost.status, len(self._gauges))
+            readings = unread(lost, lost.status, self._followers)
         else:
             readings = measured_together(self._followers, picture_of(lost, settings))
         self._newest = readings

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.reading import GaugeStatus, Mark
+from fingervision.gauges.similar_objects import GUARD, PRESENT_SHARE, SAME_PX, Followed, Seen
 from fingervision.vision.edge_search import Profile, StepCandidate, candidates, profile
 from fingervision.vision.response_shift import u_edge_px
 from fingervision.vision.straight_edge_fit import (
@@ -36,12 +37,6 @@ LEANS = tuple(float(lean) for lean in np.linspace(-0.6, 0.6, 13))
 MOST_LEAN = 1.0
 # Number of strips of the profile beyond the search distance, so that an edge at this distance is completely visible.
 BEYOND_PX = 8
-# No similar edge may lie within this multiple of reach_px; a motion may then exceed reach_px by half without a
-# confusion with a neighbouring edge.
-GUARD = 1.5
-# Largest multiple of reach_px within which an object is searched after frames without a value; the multiple is reduced
-# if a similar object was nearby in the first frame.
-MOST_TIMES = 4
 # Smallest contrast of a neighbouring edge, as a share of the measured edge's contrast, at which it is fitted too.
 LEAST_BESIDE = 0.1
 # At a smaller distance (in standard deviations of the blur), contrast and distance of two edges cannot be
@@ -280,12 +275,7 @@ def _cut_plateau(picture: Picture, levels: Floats) -> int:
 # Track one straight edge from frame to frame, taking account of other edges beside it.
 
 
-# Distance (pixels) below which two steps of a profile are the same edge; a profile of strips of one pixel determines
-# the position of a step to half a pixel.
-SAME_PX = 2.0
-
-
-class EdgeFollower:
+class EdgeFollower(Followed):
     """Finds one edge near its position in the previous frame.
 
     Parameters
@@ -301,17 +291,11 @@ class EdgeFollower:
     """
 
     def __init__(self, axes: Axes, at_px: float, length_px: float, reach_px: float, polarity: int) -> None:
-        self.axes, self.length_px, self.reach_px = axes, length_px, reach_px
+        super().__init__(reach_px)
+        self.axes, self.length_px, self.slope = axes, length_px, 0.0
         self.at_px, self.polarity = at_px, polarity
-        self.slope, self.missed, self.most_times = 0.0, 0, float(MOST_TIMES)
-        self.beside_px: tuple[float, ...] = ()
         self.first_reach_px = reach_px
         self.known: EdgeFound | None = None
-
-    @property
-    def times(self) -> float:
-        """Multiple of `reach_px` within which the edge is searched."""
-        return min(1.0 + self.missed, self.most_times)
 
     @property
     def zone(self) -> Mark:
@@ -322,34 +306,50 @@ class EdgeFollower:
         """Continue to follow an edge with other axes, in which the edge has the given position and slope."""
         self.axes, self.at_px, self.slope = axes, at_px, slope
 
-    def lost(self) -> None:
-        """Widen the search zone of the next frame, because the edge was not found."""
-        self.missed += self.known is not None
-
-    def candidate(self, picture: Picture) -> tuple[StepCandidate, list[StepCandidate]] | NotFound:
-        """The only candidate that may be the edge, together with the other edges beside it."""
-        reach = self.first_reach_px if self.known is None else self.reach_px * self.times
-        guard = reach if self.known is None else GUARD * reach
-        half = ceil(guard) + BEYOND_PX
+    def _seen(self, picture: Picture, slope: float, half_px: float) -> tuple[Profile, float] | None:
+        """Profile around the edge's last position, and what its middle differs from that; None outside the picture."""
         middle = self.axes.point(self.at_px)
         anchor = (round(middle[0]), round(middle[1]))
         width, height = picture.size_px
         if not (0 <= anchor[0] < width and 0 <= anchor[1] < height):
-            return NotFound(GaugeStatus.OUT_OF_VIEW)
+            return None
         cosine, sine = cos(self.axes.direction_rad), sin(self.axes.direction_rad)
         off_t = cosine * (anchor[0] - middle[0]) + sine * (anchor[1] - middle[1])
         off_s = -sine * (anchor[0] - middle[0]) + cosine * (anchor[1] - middle[1])
+        half, direction = ceil(half_px) + BEYOND_PX, self.axes.direction_rad
+        seen = profile(picture.grey, picture.light, anchor, direction, slope, self.length_px, half)
+        return seen, off_t - slope * off_s
 
-        def seen_at(lean: float) -> Profile:
-            return profile(picture.grey, picture.light, anchor, self.axes.direction_rad, lean, self.length_px, half)
+    def similar(self, picture: Picture) -> Seen:
+        """Edges like the own one along the gauge's direction."""
+        found = self._seen(picture, self.slope, self.wide_px)
+        if found is None or self.known is None:
+            return Seen(np.zeros((0, 2)), np.zeros(0, dtype=bool), np.zeros(2), np.zeros(2))
+        seen, off = found
+        ratio = np.array([[step.position_px + off, step.contrast / self.known.contrast] for step in candidates(seen)])
+        places, ratio = ratio.reshape(-1, 2).T
+        is_there = (ratio >= LEAST_OF_KNOWN * PRESENT_SHARE) & (ratio <= MOST_OF_KNOWN / PRESENT_SHARE)
+        is_alike = (ratio >= LEAST_OF_KNOWN) & (ratio <= MOST_OF_KNOWN)
+        in_view = np.flatnonzero(seen.weight > 0.5) - seen.half + off
+        return Seen(
+            np.stack((places, np.zeros_like(places)), axis=1)[is_there], is_alike[is_there],
+            np.array([in_view[0] + BEYOND_PX, -np.inf]), np.array([in_view[-1] - BEYOND_PX, np.inf]),
+        )  # fmt: skip
 
+    def candidate(self, picture: Picture) -> tuple[StepCandidate, list[StepCandidate]] | NotFound:
+        """The only candidate that may be the edge, together with the other edges beside it."""
+        reach = self.first_reach_px if self.known is None else self.reach_px * self.times
+        # Before the first value, the edge may have moved in every frame that gave none.
+        guard = GUARD * reach if self.known is not None else min(reach + self.missed * self.reach_px, self.wide_px)
         if self.known is None:
-            profiles = [seen_at(lean) for lean in LEANS]
-            best = int(np.argmax([self._steepest(seen, reach) for seen in profiles]))
-            self.slope, seen = LEANS[best], profiles[best]
-        else:
-            seen = seen_at(self.slope)
-        off = off_t - self.slope * off_s
+            leaning = [self._seen(picture, lean, guard) for lean in LEANS]
+            profiles = [seen for seen in leaning if seen is not None]
+            steep = [self._steepest(seen, reach) for seen, _ in profiles]
+            self.slope = LEANS[int(np.argmax(steep))] if steep else 0.0
+        found = self._seen(picture, self.slope, guard)
+        if found is None:
+            return NotFound(GaugeStatus.OUT_OF_VIEW)
+        seen, off = found
         steps = [replace(step, position_px=step.position_px + off) for step in candidates(seen)]
         if self.known is None:
             strongest = max((abs(step.contrast) for step in self._in_reach(steps, reach)), default=0.0)
@@ -359,63 +359,27 @@ class EdgeFollower:
         least = max(least, CONTRAST_FLOOR * picture.top)
         alike = [step for step in self._in_reach(steps, guard) if least <= abs(step.contrast) <= most]
         if not alike:
-            if not steps and self.known is None:
-                return NotFound(GaugeStatus.LOW_CONTRAST)
-            return NotFound(GaugeStatus.NO_EDGE)
-        if len(alike) > 1:
+            return NotFound(GaugeStatus.NO_EDGE if steps or self.known is not None else GaugeStatus.LOW_CONTRAST)
+        chosen = self._own(picture, alike)
+        if isinstance(chosen, StepCandidate) and abs(chosen.position_px) > reach + 1.0:
+            return NotFound(GaugeStatus.NO_EDGE, "the edge found is farther away than reach_px")
+        return (chosen, steps) if isinstance(chosen, StepCandidate) else chosen
+
+    def _own(self, picture: Picture, alike: list[StepCandidate]) -> StepCandidate | NotFound:
+        """The own edge among those that are alike."""
+        if self.known is None or not (self.missed or (len(alike) == 1 and self.is_doubtful(alike[0].position_px))):
+            if len(alike) == 1:
+                return alike[0]
             places = ", ".join(f"{step.position_px:+.0f}" for step in alike)
             return NotFound(
                 GaugeStatus.AMBIGUOUS, f"{len(alike)} edges lie within reach_px, at {places} px along the direction"
             )
-        if abs(alike[0].position_px) > reach + 1.0:
-            return NotFound(GaugeStatus.NO_EDGE, "the edge found is farther away than reach_px")
-        if self.missed and self._may_be_another(picture, anchor, off, alike[0].position_px, (least, most)):
-            return NotFound(
-                GaugeStatus.AMBIGUOUS,
-                f"since it was found last, {self.missed + 1} frames ago, the edge may have moved so far that this is a "
-                "similar one beside it",
-            )
-        if self.known is None:
-            wide = self._wide(picture, anchor)
-            self._note_beside(candidates(wide), replace(alike[0], position_px=alike[0].position_px - off))
-        return alike[0], steps
-
-    def _note_beside(self, steps: list[StepCandidate], own: StepCandidate) -> None:
-        """Note where similar edges lie beside the own one, and how far the search may be widened without them."""
-        apart = [
-            step.position_px - own.position_px
-            for step in steps
-            if LEAST_OF_KNOWN <= step.contrast / own.contrast <= MOST_OF_KNOWN
-        ]
-        self.beside_px = tuple(away for away in apart if abs(away) > SAME_PX)
-        nearest = min(map(abs, self.beside_px), default=float("inf"))
-        self.most_times = float(np.clip((nearest - SAME_PX) / (GUARD * self.reach_px), 1.0, MOST_TIMES))
-
-    def _wide(self, picture: Picture, anchor: tuple[int, int]) -> Profile:
-        """Profile over all places to which the search may be widened."""
-        half = ceil(GUARD * MOST_TIMES * self.reach_px) + BEYOND_PX
-        direction = self.axes.direction_rad
-        return profile(picture.grey, picture.light, anchor, direction, self.slope, self.length_px, half)
-
-    def _may_be_another(
-        self, picture: Picture, anchor: tuple[int, int], off_px: float, at_px: float, contrasts: tuple[float, float]
-    ) -> bool:
-        """Whether an edge here may be one beside the own one, which may have moved by `reach_px` in each frame.
-
-        Then the own one lies where it lay beside that one, and is seen there, or lies out of view.
-        """
-        reach = self.reach_px * min(1 + self.missed, MOST_TIMES)
-        places = [at_px - away - off_px for away in self.beside_px if abs(at_px - away) <= reach]
-        if not places:
-            return False
-        wide = self._wide(picture, anchor)
-        sign = 1 if self.known is None or self.known.contrast > 0.0 else -1
-        seen = [step.position_px for step in candidates(wide) if contrasts[0] <= sign * step.contrast <= contrasts[1]]
-        in_view = wide.weight[np.clip(np.rint(places).astype(int) + wide.half, 0, wide.weight.size - 1)] > 0.5
-        return any(
-            not is_seen or any(abs(place - one) <= SAME_PX for one in seen)
-            for place, is_seen in zip(places, in_view, strict=True)
-        )
+        place = self.own_place(picture)
+        if isinstance(place, GaugeStatus):
+            return NotFound(GaugeStatus.NO_EDGE if place is GaugeStatus.NOT_FOUND else place)
+        chosen = min(alike, key=lambda step: abs(step.position_px - place[0]))
+        is_it = abs(chosen.position_px - place[0]) <= SAME_PX
+        return chosen if is_it else NotFound(GaugeStatus.AMBIGUOUS)
 
     def _in_reach(self, steps: list[StepCandidate], reach: float) -> list[StepCandidate]:
         sign = self.polarity if self.known is None else (1 if self.known.contrast > 0.0 else -1)
@@ -439,9 +403,10 @@ class EdgeFollower:
             self.lost()
             return found
         (one,), _ = found
-        self.keep(one)
+        self.keep(one, picture)
         return one
 
-    def keep(self, found: EdgeFound) -> None:
+    def keep(self, found: EdgeFound, picture: Picture) -> None:
         """Store the position of the edge for the next frame."""
-        self.known, self.at_px, self.slope, self.missed = found, found.position_px, found.slope, 0
+        self.known, self.at_px, self.slope = found, found.position_px, found.slope
+        self.kept(picture)

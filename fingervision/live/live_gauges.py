@@ -7,10 +7,9 @@ from typing import Any
 
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
-from fingervision.gauges.kinds import measured_together
+from fingervision.gauges.kinds import measured_together, unread
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
-from fingervision.gauges.reading import unread
 from fingervision.live.playback.gauge_board import GaugeBoard
 from fingervision.live.playback.gauge_following import FOLLOWING, GAUGES, NO_SCALE, GaugesBeside, told
 from fingervision.live.session import Session
@@ -80,6 +79,8 @@ class LiveGauges:
         is_left_out = self._session.in_a_hurry
         self._left_out.append(is_left_out)
         if is_left_out:
+            for _, follower in self._followers.values():
+                follower.lost()
             return
         with self._session.supervisor.watching(FOLLOWING):
             self._read_all(item, row)
@@ -100,13 +101,13 @@ class LiveGauges:
             for gauge in gauges
         }
         status = row.status if row is not None else None
+        followers = [self._followers[gauge.name][1] for gauge in gauges]
         if isinstance(item, LostFrame):
-            readings = unread(item, item.status, len(gauges))
+            readings = unread(item, item.status, followers)
         elif status in (Status.DAMAGED, Status.DUPLICATE):
-            readings = unread(item, status, len(gauges))
+            readings = unread(item, status, followers)
         else:
             settings, _ = task.settings_for(())
-            followers = [self._followers[gauge.name][1] for gauge in gauges]
             readings = list(measured_together(followers, picture_of(item, settings)))
         description = self._session.description
         plane = PlaneScale(task.scale, (description.width_px, description.height_px))

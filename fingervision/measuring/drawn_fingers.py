@@ -243,6 +243,9 @@ class CarriedPair:
         """Return the gauge itself: the poses follow its faces."""
         return self
 
+    def lost(self) -> None:
+        """A frame that was not read changes nothing: the poses follow its faces."""
+
     def measured(self, picture: Picture) -> Reading:
         """Measure the pair in a frame."""
         carried = self.by_frame.get(picture.frame.index)

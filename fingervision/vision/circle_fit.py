@@ -138,7 +138,8 @@ def _columns(x: Floats, y: Floats, p: Floats) -> tuple[Floats, Floats]:
     dx, dy = x - p[0], y - p[1]
     r = np.maximum(np.hypot(dx, dy), 1e-9)
     cosine, sine = np.abs(dx) / r, np.abs(dy) / r
-    wide, narrow = np.maximum(cosine, sine), np.minimum(cosine, sine)
+    # In a pixel whose middle is the centre, there is no direction; elsewhere the larger one is at least 1 / sqrt(2).
+    wide, narrow = np.maximum(np.maximum(cosine, sine), 0.5**0.5), np.minimum(cosine, sine)
     sigma = np.sqrt(p[3] ** 2 + narrow**2 / 12.0)
     step, density, widening = blurred_box_step(p[2] - r, sigma, wide)
     one = np.ones_like(r)

@@ -5,8 +5,10 @@ import pkgutil
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+from fingervision.domain.frame import LostFrame
+from fingervision.domain.status import Status
 from fingervision.gauges.picture import Picture
-from fingervision.gauges.reading import Reading
+from fingervision.gauges.reading import GaugeStatus, Reading
 
 
 class Follower(Protocol):
@@ -14,6 +16,10 @@ class Follower(Protocol):
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
+        ...
+
+    def lost(self) -> None:
+        """Note that a frame passed in which the object was not measured, and may have moved."""
         ...
 
 
@@ -66,3 +72,21 @@ def measured_together(followers: Sequence[Follower], picture: Picture) -> list[R
         alike = [i for i, other in enumerate(followers) if type(other) is type(follower)]
         readings |= dict(zip(alike, together([followers[i] for i in alike], picture), strict=True))
     return [readings[number] for number in range(len(followers))]
+
+
+def unread(frame: object, status: Status, followers: Sequence[Follower]) -> list[Reading]:
+    """Readings of all gauges in a frame whose picture is lost or rejected: no values, with the frame's reason.
+
+    Parameters
+    ----------
+    frame : Frame or LostFrame
+        The frame; a lost frame states its reason.
+    status : Status
+        Status of the frame.
+    followers : sequence of Follower
+        The gauges; their objects may have moved meanwhile.
+    """
+    for follower in followers:
+        follower.lost()
+    words = frame.words if isinstance(frame, LostFrame) else ""
+    return [Reading(GaugeStatus(status.value), words=words)] * len(followers)

@@ -13,16 +13,15 @@ from fingervision.gauges.common_keys import REACH_PX, Placed, Reach
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Distance, Position
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
+from fingervision.gauges.similar_objects import GUARD, Followed, Seen, seen_alike
 from fingervision.gauges.straight_edge import (
     CONTRAST_FLOOR,
-    GUARD,
     LARGEST_BLUR_PX,
     LEAST_OF_KNOWN,
     LEAST_PIECE,
     LEAST_SURE_PX,
     MOST_NOISE,
     MOST_OF_KNOWN,
-    MOST_TIMES,
 )
 from fingervision.vision.circle_fit import Circle, NoCircleFitError, fit_circle
 from fingervision.vision.response_shift import u_edge_px
@@ -62,14 +61,14 @@ class CircleSpec(Placed):
 SPEC = CircleSpec
 
 
-class FollowedCircle:
+class FollowedCircle(Followed):
     """Tracks one disc or hole through the frames of one recording."""
 
     def __init__(self, spec: CircleSpec) -> None:
+        super().__init__(spec.reach_px)
         self._spec = spec
         self._at = (*spec.middle_px, 0.5 * spec.diameter_px)
         self._known: Circle | None = None
-        self._times, self._most_times = 1.0, float(MOST_TIMES)
 
     def _zone(self) -> Mark:
         x, y, radius = self._at
@@ -81,14 +80,11 @@ class FollowedCircle:
         zone = self._zone()
         found = self._found(picture)
         if not isinstance(found, Circle):
-            self._times = min(self._times + 1.0, self._most_times) if self._known is not None else 1.0
+            self.lost()
             status, words = found
             return Reading(status, zone=zone, words=words)
-        is_first = self._known is None
-        self._known, self._times = found, 1.0
-        self._at = (found.x_px, found.y_px, found.radius_px)
-        if is_first:
-            self._most_times = self._times_alone(picture)
+        self.kept(picture)
+        self._known, self._at = found, (found.x_px, found.y_px, found.radius_px)
         displaced = _displaced_px(picture, found)
         u_x, u_y, u_radius = (hypot(sqrt(float(found.covariance[i, i])), displaced) for i in range(3))
         centre, radius = (found.x_px, found.y_px), found.radius_px
@@ -119,7 +115,7 @@ class FollowedCircle:
         refused = self._refused(picture, found)
         if refused is not None:
             return refused
-        reach = self._spec.reach_px * self._times
+        reach = self.reach_px * (self.times if self._known is not None else 1)
         if hypot(found.x_px - x, found.y_px - y) > reach + 1.0:
             return GaugeStatus.NOT_FOUND, "the disc is farther away than reach_px permits"
         return found
@@ -149,22 +145,28 @@ class FollowedCircle:
             return GaugeStatus.LOW_CONTRAST, ""
         return None
 
-    def _times_alone(self, picture: Picture) -> float:
-        """Multiple of `reach_px` up to which the search may be widened without including a similar disc."""
-        for times in range(2, MOST_TIMES + 1):
-            self._times = float(times)
-            is_alone = self._start(picture)[0] is not GaugeStatus.AMBIGUOUS
-            self._times = 1.0
-            if not is_alone:
-                return float(times - 1)
-        return float(MOST_TIMES)
+    def similar(self, picture: Picture) -> Seen:
+        """Discs like the own one around its last place."""
+        (x, y, radius), sign = self._at, 1 if self._known is None or self._known.contrast > 0.0 else -1
+        return seen_alike(picture, Template(sign * _disc(radius)), (x, y), self.wide_px, LEAST_CORRELATION)
 
     def _start(self, picture: Picture) -> tuple[float, float, float, float] | tuple[GaugeStatus, str]:
         """Initial estimates of centre and radius in the next frame, with their uncertainties."""
         x, y, radius = self._at
+        if self._known is None or not self.missed:
+            found = self._only_disc(picture)
+            if self._known is None or isinstance(found[0], GaugeStatus):
+                return found
+            if not self.is_doubtful(hypot(found[0] - x, float(found[1]) - y)):
+                return found
+        place = self.own_place(picture)
+        return (place, "") if isinstance(place, GaugeStatus) else (x + place[0], y + place[1], radius, 0.6)
+
+    def _only_disc(self, picture: Picture) -> tuple[float, float, float, float] | tuple[GaugeStatus, str]:
+        x, y, radius = self._at
         tried = TRIED if self._known is None else (1.0,)
         by = max(1, int(radius / SEARCH_RADIUS_PX))
-        reach = GUARD * self._spec.reach_px * self._times
+        reach = GUARD * self.reach_px * self.times
         half = ceil((radius * max(tried) * (1.0 + SURROUNDINGS) + reach) / by) + BEYOND_PX + 2
         side = (2 * half + 1) * by
         left, top = round(x) - side // 2, round(y) - side // 2

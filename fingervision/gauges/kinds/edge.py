@@ -36,6 +36,10 @@ class FollowedEdge:
         axes = Axes(*spec.middle_px, radians(spec.direction_deg))
         self._edge = EdgeFollower(axes, 0.0, spec.length_px, spec.reach_px, POLARITIES[spec.polarity])
 
+    def lost(self) -> None:
+        """Note a frame that was not read."""
+        self._edge.lost()
+
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
         edge, axes = self._edge, self._edge.axes

@@ -47,6 +47,9 @@ class FollowedGap:
         self._looks = True
         self._beside: BesideEdges | None = None
 
+    def lost(self) -> None:
+        """A frame that was not read leaves the region where it is."""
+
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
         region = self._region(picture)

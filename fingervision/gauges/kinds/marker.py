@@ -12,10 +12,11 @@ from fingervision.gauges.common_keys import REACH_PX, Placed, Reach
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Position
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
-from fingervision.gauges.straight_edge import CONTRAST_FLOOR, GUARD, MOST_TIMES
+from fingervision.gauges.similar_objects import GUARD, Followed, Seen, only_place, seen_alike
+from fingervision.gauges.straight_edge import CONTRAST_FLOOR
 from fingervision.vision.symmetry_fit import BEYOND_PX as WINDOW_BEYOND_PX
 from fingervision.vision.symmetry_fit import NoSymmetryError, Symmetric, fit_symmetry
-from fingervision.vision.template_search import BEYOND_PX, Template
+from fingervision.vision.template_search import Template
 
 QUANTITIES = (("x", "length"), ("y", "length"))
 SHAPES = ("dot", "cross", "corner")
@@ -57,16 +58,16 @@ class MarkerSpec(Placed):
 SPEC = MarkerSpec
 
 
-class FollowedMarker:
+class FollowedMarker(Followed):
     """Tracks one mark through the frames of one recording."""
 
     def __init__(self, spec: MarkerSpec) -> None:
+        super().__init__(spec.reach_px)
         self._spec = spec
         self._half = max(int(spec.size_px) // 2, 3)
         self._at = spec.middle_px
         self._template: Template | None = None
         self._first: Symmetric | None = None
-        self._times, self._most_times = 1.0, float(MOST_TIMES)
 
     def _zone(self) -> Mark:
         (x, y), half = self._at, self._half
@@ -77,11 +78,12 @@ class FollowedMarker:
         zone = self._zone()
         found = self._found(picture)
         if isinstance(found[0], GaugeStatus):
-            self._times = min(self._times + 1.0, self._most_times) if self._template is not None else 1.0
+            self.lost()
             status, words = found
             return Reading(status, zone=zone, words=words)
         (x, y), covariance = found
-        self._at, self._times = (x, y), 1.0
+        self._at = (x, y)
+        self.kept(picture)
         quantities = (
             Position((x, y), 0.0, sqrt(float(covariance[0, 0]))),
             Position((x, y), 0.5 * np.pi, sqrt(float(covariance[1, 1]))),
@@ -105,7 +107,7 @@ class FollowedMarker:
         found, place = best
         away = hypot(place[0] - self._at[0], place[1] - self._at[1])
         first_reach = min(self._spec.reach_px, NEAR * self._spec.size_px)
-        if away > (first_reach if self._template is None else self._spec.reach_px * self._times) + 1.0:
+        if away > (first_reach if self._template is None else self.reach_px * self.times) + 1.0:
             return GaugeStatus.NOT_FOUND, "the mark is farther away than reach_px permits"
         if self._template is None:
             refused = self._taken(picture, place)
@@ -124,18 +126,13 @@ class FollowedMarker:
             reach = min(self._spec.reach_px, NEAR * self._spec.size_px)
             offsets = [0.0] if step > reach else [-step, 0.0, step]
             return [(x + across, y + down) for across in offsets for down in offsets]
-        half = self._half + ceil(GUARD * self._spec.reach_px * self._times) + BEYOND_PX
-        levels, (left, top) = picture.part(round(x) - half, round(y) - half, 2 * half + 1, 2 * half + 1)
-        least = 2 * (self._half + BEYOND_PX) + 3
-        if min(levels.shape) < least:
-            return GaugeStatus.OUT_OF_VIEW, ""
-        match = self._template.best_match(levels.astype(np.float32))
-        is_cut = levels.shape != (2 * half + 1, 2 * half + 1)
-        if match.correlation < LEAST_CORRELATION:
-            return (GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.NOT_FOUND), ""
-        if not match.is_alone:
-            return (GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.AMBIGUOUS), ""
-        return [(left + match.x_px, top + match.y_px)]
+        place = self.place_of(picture, self._template, (x, y), LEAST_CORRELATION)
+        return (place, "") if isinstance(place, GaugeStatus) else [place]
+
+    def similar(self, picture: Picture) -> Seen:
+        """Marks like the own one around its last place."""
+        template = self._template or Template(np.zeros((1, 1), dtype=np.float32))
+        return seen_alike(picture, template, self._at, self.wide_px, LEAST_CORRELATION)
 
     def _fitted(
         self, picture: Picture, start: tuple[float, float]
@@ -180,16 +177,9 @@ class FollowedMarker:
         if own.shape != (2 * self._half + 1, 2 * self._half + 1):
             return GaugeStatus.OUT_OF_VIEW, ""
         template = Template(own.astype(np.float32))
-        for times in range(1, MOST_TIMES + 1):
-            half = self._half + ceil(GUARD * self._spec.reach_px * times) + BEYOND_PX
-            levels, _ = picture.part(x - half, y - half, 2 * half + 1, 2 * half + 1)
-            if min(levels.shape) < 2 * (self._half + BEYOND_PX) + 3:
-                continue
-            if not template.best_match(levels.astype(np.float32)).is_alone:
-                if times == 1:
-                    return GaugeStatus.AMBIGUOUS, "a similar mark lies within 1.5 times reach_px"
-                self._most_times = float(times - 1)
-                break
+        alone = only_place(picture, template, (x, y), GUARD * self.reach_px * self.times, LEAST_CORRELATION)
+        if isinstance(alone, GaugeStatus):
+            return GaugeStatus.AMBIGUOUS, "a similar mark lies within 1.5 times reach_px for each frame since the first"
         self._template = template
         return None
 

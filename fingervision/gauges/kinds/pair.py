@@ -63,6 +63,11 @@ class FollowedPair:
         for edge in self._edges:
             edge.first_reach_px = min(spec.reach_px, NEAR_OWN * spec.distance_px)
 
+    def lost(self) -> None:
+        """Note a frame in which the pair was not seen."""
+        for edge in self._edges:
+            edge.lost()
+
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
         first, second = self._edges
@@ -74,12 +79,11 @@ class FollowedPair:
         )
         found = self._found(picture)
         if isinstance(found, NotFound):
-            for edge in self._edges:
-                edge.lost()
+            self.lost()
             return Reading(found.status, zone=zone, words=found.words)
         (left, right), covariance = found
         for edge, one in zip(self._edges, (left, right), strict=True):
-            edge.keep(one)
+            edge.keep(one, picture)
         along = self._along_px
         places = tuple(axes.point(one.position_px + one.slope * along, along) for one in (left, right))
         half = 0.5 * first.length_px

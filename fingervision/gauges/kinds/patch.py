@@ -14,6 +14,7 @@ from fingervision.gauges.common_keys import REACH_PX, Placed, Reach
 from fingervision.gauges.picture import Picture
 from fingervision.gauges.quantities import Angle, Shift
 from fingervision.gauges.reading import GaugeStatus, Mark, Reading
+from fingervision.gauges.similar_objects import GUARD, Followed, Seen, seen_alike
 from fingervision.vision.patch_covariance import reference_covariance
 from fingervision.vision.patch_reference import MARGIN_PX, PatchReference, patch_reference
 from fingervision.vision.patch_registration import register
@@ -26,9 +27,8 @@ SIZE = "size of a `patch`"
 # value. A coarse texture needs a higher correlation than chance would give; if chance gives more than the second value,
 # the patch is too small for its texture.
 LEAST_CORRELATION, MOST_BY_CHANCE = 0.7, 0.9
-# No similar texture may lie within this multiple of reach_px (the same limit as for edges), and largest multiple of
-# reach_px within which a lost patch is searched.
-GUARD, MOST_TIMES = 1.5, 4
+# Share of this correlation that is enough before the registration, which then increases it.
+NEARLY = 0.8
 # Rotation of the patch relative to its template (radians) above which the template is rotated too; at a distance of 15
 # px from the centre, this rotation is a displacement of 1.5 px.
 TURN_AT = 0.1
@@ -61,10 +61,11 @@ class PatchSpec(Placed):
 SPEC = PatchSpec
 
 
-class FollowedPatch:
+class FollowedPatch(Followed):
     """Tracks one patch through the frames of one recording."""
 
     def __init__(self, spec: PatchSpec) -> None:
+        super().__init__(spec.reach_px)
         self._spec = spec
         self.half = (max(int(spec.width_px) // 2, 4), max(int(spec.height_px) // 2, 4))
         self.reference: PatchReference | None = None
@@ -74,7 +75,6 @@ class FollowedPatch:
         self._least_correlation = LEAST_CORRELATION
         self._refused: Reading | None = None
         self._at = (*spec.middle_px, 0.0)
-        self._times, self._most_times = 1.0, float(MOST_TIMES)
 
     def measured(self, picture: Picture) -> Reading:
         """Measure the next frame."""
@@ -108,7 +108,7 @@ class FollowedPatch:
                 place = (float(found.x_px[k]), float(found.y_px[k]), float(found.turn_rad[k]))
                 readings[number] = own[k].taken(
                     place, found.covariance[k], float(found.correlation[k]), bool(found.settled[k]),
-                    float(found.aliasing_px[k]),
+                    float(found.aliasing_px[k]), picture,
                 )  # fmt: skip
         return [readings[number] for number in range(len(followers))]
 
@@ -124,7 +124,7 @@ class FollowedPatch:
         return self._refused
 
     def _failed(self, status: GaugeStatus, words: str = "") -> Reading:
-        self._times = min(self._times + 1.0, self._most_times)
+        self.lost()
         return Reading(status, zone=self._zone(), words=words)
 
     def begun(self, picture: Picture) -> Reading:
@@ -155,47 +155,32 @@ class FollowedPatch:
                 GaugeStatus.LOW_CONTRAST, "the texture is too coarse for the size of the patch: enlarge the patch"
             )
         self._least_correlation = max(LEAST_CORRELATION, chance)
-        self._most_times = self._times_alone(picture, template, column, row)
         self.reference = reference
         self._around, self._template = part, template
         self._at = (float(column), float(row), 0.0)
+        self.kept(picture)
         zero = (Shift((x, y), (x, y), 0.0, 0.0), Shift((x, y), (x, y), 0.5 * np.pi, 0.0), Angle((x, y), 0.0, 0.0, True))
         return Reading(GaugeStatus.OK, zero, (Mark(((x, y),)),), self._zone())
 
-    def _times_alone(self, picture: Picture, template: Template, column: int, row: int) -> float:
-        """Multiple of `reach_px` up to which the search may be widened without including a similar texture."""
-        a, b = self.half
-        for times in range(2, MOST_TIMES + 1):
-            reach = ceil(GUARD * self._spec.reach_px * times) + BEYOND_PX
-            levels, _ = picture.part(column - a - reach, row - b - reach, 2 * (a + reach) + 1, 2 * (b + reach) + 1)
-            if not template.best_match(levels.astype(np.float32)).is_alone:
-                return float(times - 1)
-        return float(MOST_TIMES)
+    def similar(self, picture: Picture) -> Seen:
+        """Textures like the patch around its last place."""
+        x, y, turn = self._at
+        return seen_alike(picture, self._turned(turn), (x, y), self.wide_px, NEARLY * self._least_correlation)
 
     def sought(self, picture: Picture) -> tuple[Floats, tuple[int, int], NDArray[np.float64]] | Reading:
         """Locate the patch roughly: return the part of the picture for the registration, and an initial estimate."""
-        a, b = self.half
-        x, y, turn = self._at
-        reach = ceil(GUARD * self._spec.reach_px * self._times) + BEYOND_PX
-        column, row = round(x), round(y)
-        levels, (left, top) = picture.part(
-            column - a - reach, row - b - reach, 2 * (a + reach) + 1, 2 * (b + reach) + 1
-        )
-        if levels.shape[0] < 2 * (b + BEYOND_PX) + 3 or levels.shape[1] < 2 * (a + BEYOND_PX) + 3:
-            return self._failed(GaugeStatus.OUT_OF_VIEW)
-        match = self._turned(turn).best_match(levels.astype(np.float32))
-        away = hypot(left + match.x_px - x, top + match.y_px - y)
-        is_cut = levels.shape != (2 * (b + reach) + 1, 2 * (a + reach) + 1)
-        if match.correlation < 0.8 * self._least_correlation or away > self._spec.reach_px * self._times + 1.0:
-            return self._failed(GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.NOT_FOUND)
-        if not match.is_alone:
-            return self._failed(GaugeStatus.OUT_OF_VIEW if is_cut else GaugeStatus.AMBIGUOUS)
+        (a, b), (x, y, turn) = self.half, self._at
+        found = self.place_of(picture, self._turned(turn), (x, y), NEARLY * self._least_correlation)
+        if isinstance(found, GaugeStatus):
+            return self._failed(found)
+        if hypot(found[0] - x, found[1] - y) > self.reach_px * self.times + 1.0:
+            return self._failed(GaugeStatus.NOT_FOUND)
         # Margin for the rotated patch, and for the interpolation.
         more = MARGIN_PX + 3 + ceil(max(a, b) * min(abs(sin(turn)) + 0.1, 1.0) * 0.5)
-        middle = (left + round(match.x_px), top + round(match.y_px))
+        middle = (round(found[0]), round(found[1]))
         corner = (middle[0] - a - more, middle[1] - b - more)
         part = _padded(picture, *corner, 2 * (a + more) + 1, 2 * (b + more) + 1)
-        return part, corner, np.array([left + match.x_px, top + match.y_px, turn])
+        return part, corner, np.array([*found, turn])
 
     def _turned(self, turn: float) -> Template:
         """The template of the patch, rotated as the patch was in the previous frame."""
@@ -221,12 +206,13 @@ class FollowedPatch:
         correlation: float,
         settled: bool,
         aliasing_px: float,
+        picture: Picture,
     ) -> Reading:
         """Accept or reject the result of a registration, and store an accepted result."""
         x, y, turn = place
         if not settled or correlation < self._least_correlation:
             return self._failed(GaugeStatus.NOT_FOUND)
-        if hypot(x - self._at[0], y - self._at[1]) > self._spec.reach_px * self._times + 1.0:
+        if hypot(x - self._at[0], y - self._at[1]) > self.reach_px * self.times + 1.0:
             return self._failed(GaugeStatus.NOT_FOUND, "the patch would have moved farther than reach_px permits")
         if not max(covariance[0, 0], covariance[1, 1]) < LEAST_SURE_PX**2:
             return self._failed(GaugeStatus.LOW_CONTRAST)
@@ -237,7 +223,8 @@ class FollowedPatch:
                 GaugeStatus.LOW_CONTRAST,
                 "the texture of the patch is finer than the pixels: defocus the camera slightly",
             )
-        self._at, self._times = place, 1.0
+        self._at = place
+        self.kept(picture)
         # The stated point may differ from the patch's centre, which is the centre of a pixel.
         (from_x, from_y) = self._spec.middle_px
         off_x, off_y = from_x - round(from_x), from_y - round(from_y)

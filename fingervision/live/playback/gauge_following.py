@@ -11,10 +11,10 @@ from fingervision.domain.errors import StateError
 from fingervision.domain.frame import LostFrame
 from fingervision.domain.status import Status
 from fingervision.gauges.gauge_file import Gauge
-from fingervision.gauges.kinds import measured_together
+from fingervision.gauges.kinds import measured_together, unread
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
-from fingervision.gauges.reading import MEANING, Mark, Reading, unread
+from fingervision.gauges.reading import MEANING, Mark, Reading
 from fingervision.gauges.recording import cells_of
 from fingervision.live.playback.gauge_board import GaugeBoard
 from fingervision.live.playback.playback import Playback
@@ -116,7 +116,7 @@ class GaugeFollowing:
                 return
             readings: Sequence[Reading]
             if isinstance(item, LostFrame) or status in (Status.DAMAGED, Status.DUPLICATE):
-                readings = unread(item, status, len(gauges))
+                readings = unread(item, status, followers)
             else:
                 if self.first is None:
                     self.first = item.index
