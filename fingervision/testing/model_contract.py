@@ -57,7 +57,8 @@ class ModelContract:
 
     def test_its_figures_are_those_of_its_answer(self) -> None:
         """Gap per input and stiffness agree with the slopes of the model's response."""
-        model, figures = self.model(), self.model().figures()
+        model = self.model()
+        figures = model.figures()
         low, high = model.input_range_mm
         answer = model.respond(np.array([low, 0.0, 0.5 * high]))
         slope = float((answer.gap_mm[2] - answer.gap_mm[1]) / (0.5 * high))

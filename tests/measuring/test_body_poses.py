@@ -61,7 +61,8 @@ def test_the_pose_of_a_body_that_bends_is_that_of_its_area() -> None:
     lever, scale, u = MechanismPlate(read_mechanism(drawing)), 13.0, 0.15
     place = Placement(scale, np.array([186.3, 628.6]), 0.015, False)
     frames = [frame(lever, at, number, place, size_px=(560, 790)) for number, at in enumerate((0.0, u))]
-    rest, seen = (each.poses["lever"] for each in BodyTracker(lever.mechanism, BareScale(scale)).poses(frames))
+    tracker = BodyTracker(lever.mechanism, BareScale(scale), points(place, (22, 8), (-12, 26), (-2, 46)))
+    rest, seen = (each.poses["lever"] for each in tracker.poses(frames))
     u_mrad = float(np.hypot(*(np.sqrt(pose.random[2, 2]) for pose in (rest, seen))))
     assert u_mrad < 0.03
     assert seen.angle_mrad - rest.angle_mrad == pytest.approx(lever.state(u).bodies["lever"].angle_mrad, abs=3 * u_mrad)

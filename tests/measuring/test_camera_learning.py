@@ -12,7 +12,7 @@ from fingervision.domain.camera import Origin, stated_camera
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
-from fingervision.measuring.camera_learning import camera_beside, camera_of, learnt_first
+from fingervision.measuring.camera_learning import WANTED, camera_beside, camera_of, learnt_first
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests.benchmarks.camera_artefacts.classes import BELOW_PX
 from tests.benchmarks.unknown_cameras import CLASSES, PX_PER_MM, SURFACES, Film, Recording, drawn
@@ -81,7 +81,7 @@ def test_a_camera_that_sharpens_is_not_corrected_and_said(recording: Recording) 
 
 
 def test_a_response_under_which_hardly_a_frame_has_a_gap_is_not_taken() -> None:
-    film = CLASSES["linear-h264"](drawn(1_402_001, 24, SURFACES["glare"]))
+    film = CLASSES["linear-h264"](drawn(1_402_001, WANTED + 1, SURFACES["glare"]))
     frames, camera = learnt_first(film, SETTINGS, SCALE)
     assert camera.response.curve is SETTINGS.camera.response.curve
     first = next(iter(frames))

@@ -98,6 +98,7 @@ RIGIDITY_N_MM2 = 70000.0 * 4.0 * 0.5**3 / 12.0
 
 
 Kind = Callable[[Mechanism], ElasticMechanism]
+elements = partial(coarse_elements, refine=0.3)
 
 
 def drawn(folder: Path, text: str) -> Mechanism:
@@ -110,7 +111,7 @@ def column(folder: Path, preload_n: float) -> Mechanism:
     return drawn(folder, COLUMN + SIDE + WEIGHT + f"preload_n = {preload_n}\n")
 
 
-@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame])
+@pytest.mark.parametrize("kind", [elements, MechanismFrame], ids=["elements", "frame"])
 def test_a_leaf_under_a_weight_is_the_beam_column(tmp_path: Path, kind: Kind) -> None:
     """Stiffness across a guided column: P / (L (tan x / x - 1)) with x = L sqrt(P / EI) / 2, and 0 at Euler's load.
 
@@ -132,7 +133,7 @@ def test_a_leaf_under_a_weight_is_the_beam_column(tmp_path: Path, kind: Kind) ->
         assert falls == pytest.approx(np.sqrt(model.stiffness_n_mm / bare.stiffness_n_mm), rel=0.002)
 
 
-@pytest.mark.parametrize("kind", [partial(coarse_elements, refine=0.5), MechanismFrame], ids=["elements", "frame"])
+@pytest.mark.parametrize("kind", [partial(elements, refine=0.5), MechanismFrame], ids=["elements", "frame"])
 def test_a_preload_states_its_force_sag_and_stress(tmp_path: Path, kind: Kind) -> None:
     """A weight on a straight leaf shortens it by P L / (E A), and the bodies a little, at a stress of P / A.
 
@@ -146,7 +147,7 @@ def test_a_preload_states_its_force_sag_and_stress(tmp_path: Path, kind: Kind) -
     assert not any("preload" in name for name in response_figures(kind(column(tmp_path, 0.0))))
 
 
-@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame])
+@pytest.mark.parametrize("kind", [elements, MechanismFrame], ids=["elements", "frame"])
 @pytest.mark.parametrize("actuator", ["", "stiffness_n_mm = 3.0\n", "force_n_per_input = 0.5\n"])
 def test_a_stage_pressed_along_its_motion_is_the_stage_there(tmp_path: Path, kind: Kind, actuator: str) -> None:
     """The preload moves the stage as its drive would; from there on, only the large rotation there is new."""
@@ -174,7 +175,7 @@ def test_a_stage_pressed_along_its_motion_is_the_stage_there(tmp_path: Path, kin
     assert vibrating.observed["end_x_mm"].rest_mm == pytest.approx(rest.probes_mm["end"][0])
 
 
-@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame])
+@pytest.mark.parametrize("kind", [elements, MechanismFrame], ids=["elements", "frame"])
 def test_a_leaf_that_a_preload_bends_far_is_not_stretched(tmp_path: Path, kind: Kind) -> None:
     """A guided leaf carries M = P L / 2 at its ends. It comes nearer as it bends, which costs no axial strain.
 
@@ -189,7 +190,7 @@ def test_a_leaf_that_a_preload_bends_far_is_not_stretched(tmp_path: Path, kind: 
     assert bent["input_at_yield_mm"] == pytest.approx(left_mm, rel=0.01)
 
 
-@pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame])
+@pytest.mark.parametrize("kind", [elements, MechanismFrame], ids=["elements", "frame"])
 def test_a_preload_beyond_buckling_is_refused(tmp_path: Path, kind: Kind) -> None:
     """A column whose head may slide and turn buckles at pi^2 EI / (4 l^2) or less: the weight rides on its head."""
     alone = COLUMN + WEIGHT.replace("per_input = 0\n", "").replace("force_n_per_input = 1\n", "")
