@@ -10,8 +10,7 @@ import fingervision as fv
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.errors import DataError
 from fingervision.domain.report import DiagnosisReport, Verdict
-from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 PLAY_MM, NOISE_MM, GAP_MM = 0.04, 0.002, 3.0
 SAMPLE = Path(__file__).parents[2] / "sample_frames" / "opening"
@@ -37,11 +36,9 @@ def asked(folder: Path, table: Columns, slope: float = 1.0, scale: float = 1.0) 
     """Diagnose a table with a model whose gap is 3 mm plus `slope` times the input, with lengths in a unit set by
     `scale`.
     """
-    rows = "\n".join(",".join(f"{value:.6f}" for value in row) for row in zip(*table.values(), strict=True))
-    (folder / "measured.csv").write_text(",".join(table) + "\n" + rows + "\n")
+    rows = (",".join(f"{value:.6f}" for value in row) for row in zip(*table.values(), strict=True))
     ends = "\n".join(f"{u},{scale * (GAP_MM + slope * u)}" for u in (-0.5, 2.5))
-    (folder / "sim.csv").write_text("input_mm,gap_mm\n" + ends + "\n")
-    return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv")).report
+    return diagnose(*written(folder, ",".join(table), rows, ends)).report
 
 
 def singles(report: DiagnosisReport) -> set[str]:

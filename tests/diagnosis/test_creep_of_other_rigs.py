@@ -14,8 +14,7 @@ from fingervision.domain.report import Verdict
 from fingervision.interface.column_tables import measured_from_columns
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.table import TableModel
-from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 LOADS_MM = (0.4, 0.8, 1.2, 1.6)
 GAINS = (1.035, 0.97, 1.01, 0.985)
@@ -38,14 +37,12 @@ def crept(time_s: np.ndarray, opening_mm: np.ndarray) -> np.ndarray:
 def test_gains_that_differ_from_load_to_load_are_no_friction_and_no_map(tmp_path: Path) -> None:
     rng = np.random.default_rng(7)
     time_s = np.arange(0.0, HOLD_S, 1.0 / RATE_HZ)
-    rows = ["run,time_s,input_mm,gap_mm"]
+    rows: list[str] = []
     for run, (load, gain) in enumerate(zip(LOADS_MM, GAINS, strict=True)):
         u = np.where(time_s < 2.0, 0.0, load)
         gap = 3.0 + gain * crept(time_s, 2.0 * u) + NOISE_MM * rng.standard_normal(u.size)
         rows += [f"{run},{t:.4f},{x:.6f},{g:.6f}" for t, x, g in zip(time_s, u, gap, strict=True)]
-    (tmp_path / "measured.csv").write_text("\n".join(rows) + "\n")
-    (tmp_path / "simulation.csv").write_text("input_mm,gap_mm\n-0.2,2.6\n1.8,6.6\n")
-    found = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "simulation.csv")).report
+    found = diagnose(*written(tmp_path, "run,time_s,input_mm,gap_mm", rows, "-0.2,2.6\n1.8,6.6")).report
     assert found.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
     named = {name for names in found.alternatives for name in names}
     assert "viscoelastic_creep" in named

@@ -18,6 +18,7 @@ from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from tests.benchmarks.world.draw import draw_table, drawn
 from tests.benchmarks.world.folder import write_tables
+from tests.diagnosis.tables import written
 
 SEED = 811
 """Seed of a development table: table 11 had the verdict `unknown` as long as rounding was treated as structure."""
@@ -50,10 +51,8 @@ def encoder_problem(folder: Path, play_mm: float, offset_mm: float = 0.0) -> Pro
     for x in u[1:].tolist():
         place.append(min(max(place[-1], x - play_mm / 2.0), x + play_mm / 2.0))
     gap = 4.0 + 3.0 * (np.array(place) + offset_mm)
-    rows = "\n".join(f"{0.1 * k},{x:.6f},{g:.6f}" for k, (x, g) in enumerate(zip(recorded, gap, strict=True)))
-    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + rows + "\n")
-    (folder / "sim.csv").write_text("input_mm,gap_mm\n-1,1\n2.5,11.5\n")
-    data = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
+    rows = (f"{0.1 * k},{x:.6f},{g:.6f}" for k, (x, g) in enumerate(zip(recorded, gap, strict=True)))
+    data = prepare(*written(folder, "time_s,input_mm,gap_mm", rows, "-1,1\n2.5,11.5"))
     assert data.recorded.step_mm == pytest.approx(STEP_MM)
     return problem_of(data, None)
 

@@ -18,8 +18,7 @@ from fingervision.diagnosis.inference.signatures import signatures
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.effects.play_operator import play
 from fingervision.effects.stick_slip import stick
-from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 Array = NDArray[np.float64]
 EDGE_MM = 0.01
@@ -50,9 +49,7 @@ def problem_of(folder: Path, away: Array) -> Problem:
     u = stroke()
     left, right = (side * (2.0 + 3.5 * u + 0.5 * away) + EDGE_MM * rng.standard_normal(SAMPLES) for side in (-1, 1))
     lines = [f"{0.1 * k},{u[k]},{right[k] - left[k]},{left[k]},{right[k]}" for k in range(SAMPLES)]
-    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
-    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n0.6,8.2\n")
-    bench = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
+    bench = prepare(*written(folder, "time_s,input_mm,gap_mm,left_mm,right_mm", lines, "-0.6,-0.2\n0.6,8.2"))
     # The noise is only that of the frames: it contains no part of the simulated effect.
     return bench.problem(EDGE_MM * rng.standard_normal((2, SAMPLES)).ravel(), 0, explained=True)
 
@@ -108,8 +105,8 @@ def test_one_effect_that_is_there_imitates_nothing(tmp_path: Path, name: str) ->
     assert imitated(problem, shapes_of(problem), alone, [problem.nothing()]) is None
 
 
-def jerking(folder: Path, jump_mm: float, play_mm: float) -> Path:
-    """Write tables of a stage with play that moves in jumps between two rests; the input is recorded without error."""
+def jerking(folder: Path, jump_mm: float, play_mm: float) -> Problem:
+    """A stage with play that moves in jumps between two rests; its input is recorded without error."""
     rng = np.random.default_rng(SEED)
     rate_hz, stand = 10.0, 80
     way = np.concatenate([np.linspace(0.0, 0.5, 150), np.full(stand, 0.5), np.linspace(0.5, -0.3, 220)])
@@ -118,22 +115,17 @@ def jerking(folder: Path, jump_mm: float, play_mm: float) -> Path:
     jumped = stick(play(u, play_mm, 0.0), jump_mm)
     left, right = (side * (2.0 + 3.5 * jumped) + EDGE_MM * rng.standard_normal(u.size) for side in (-1, 1))
     lines = [f"{t[k]},{u[k]},{right[k] - left[k]},{left[k]},{right[k]}" for k in range(u.size)]
-    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
-    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n0.6,8.2\n")
-    return folder
+    bench = prepare(*written(folder, "time_s,input_mm,gap_mm,left_mm,right_mm", lines, "-0.6,-0.2\n0.6,8.2"))
+    return bench.problem(bench.stacked_mm - bench.chain.stacked({}), 0, explained=False)
 
 
 def test_jumps_are_no_noise_where_the_stage_stands(tmp_path: Path) -> None:
-    folder = jerking(tmp_path, 0.03, 0.0)
-    bench = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
-    problem = bench.problem(bench.stacked_mm - bench.chain.stacked({}), 0, explained=False)
+    problem = jerking(tmp_path, 0.03, 0.0)
     assert problem.whitener.noises[0].total_mm == pytest.approx(np.sqrt(2.0) * EDGE_MM, rel=0.25)
 
 
 def test_a_jump_is_tried_where_the_play_lets_it_come(tmp_path: Path) -> None:
-    folder = jerking(tmp_path, 0.03, 0.02)
-    bench = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
-    problem = bench.problem(bench.stacked_mm - bench.chain.stacked({}), 0, explained=False)
+    problem = jerking(tmp_path, 0.03, 0.02)
     sizes = [{"jump_mm": float(size)} for size in np.geomspace(0.005, 0.1, 200)]
     beside, alone = (
         scan(problem, fit(problem, tuple(values), values, iterations=0), "stick_slip", sizes)

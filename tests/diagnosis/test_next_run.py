@@ -16,8 +16,7 @@ from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.preparation import prepare
 from fingervision.diagnosis.noise.restricted_likelihood import drawn_noises
 from fingervision.domain.effect import Array
-from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 EDGE_MM = 0.003
 SHARE = 0.01
@@ -36,9 +35,7 @@ def measured(u: Array, rng: np.random.Generator) -> tuple[Array, Array]:
 def bench(folder: Path, seed: int) -> tuple[Observations, Problem]:
     left, right = measured(ONE_WAY, np.random.default_rng(seed))
     lines = [f"{STEP_S * k},{u},{r - x},{x},{r}" for k, (u, x, r) in enumerate(zip(ONE_WAY, left, right, strict=True))]
-    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
-    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n1.6,15.2\n")
-    data = prepare(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
+    data = prepare(*written(folder, "time_s,input_mm,gap_mm,left_mm,right_mm", lines, "-0.6,-0.2\n1.6,15.2"))
     alone = data.problem(data.stacked_mm - data.chain.stacked({}), 0, explained=False)
     best = explained(alone, "assembly_asymmetry", share=SHARE)
     return data, data.problem(data.stacked_mm - data.chain.stacked(best.values), 1, explained=True)

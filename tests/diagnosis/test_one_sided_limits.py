@@ -11,9 +11,8 @@ from fingervision.diagnosis.report.html_parts import with_uncertainty
 from fingervision.diagnosis.report.sentences import draws_of, limited, phrase
 from fingervision.domain.parameter import Estimate, Parameter
 from fingervision.domain.report import NamedEffect
-from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model
 from fingervision.storage.summary_json import report_document
+from tests.diagnosis.tables import written
 
 AMPLITUDE = Parameter("amplitude_mm", "mm", -2.0, 2.0, "final thermal change")
 TAU = Parameter("tau_s", "s", 2.0, 3000.0, "thermal time constant", neutral=None)
@@ -49,14 +48,12 @@ def test_a_warming_three_times_slower_than_can_be_shown_gets_true_limits(tmp_pat
     time_s, tau_s = 15.0 * np.arange(160), 9000.0
     at = 1.0 - np.cos(2.0 * np.pi * time_s / 600.0)
     gap = 4.0 + 7.7 * at + amplitude_mm * (1.0 - np.exp(-time_s / tau_s)) + 0.003 * rng.standard_normal(at.size)
-    rows = "\n".join(f"{t},{u:.5f},{g:.5f}" for t, u, g in zip(time_s, at, gap, strict=True))
-    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + rows)
-    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n-1,-3.7\n3,27.1\n")
-    report = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv")).report
+    rows = (f"{t},{u:.5f},{g:.5f}" for t, u, g in zip(time_s, at, gap, strict=True))
+    report = diagnose(*written(tmp_path, "time_s,input_mm,gap_mm", rows, "-1,-3.7\n3,27.1")).report
     assert [effect.name for effect in report.effects] == ["thermal_drift"]
-    written = json.loads(json.dumps(report_document(report, None, None)["effects"]))[0]["parameters"]
-    assert written["tau_s"]["u"] is written["amplitude_mm"]["u"] is None
-    assert 1000.0 < written["tau_s"]["at_least"] <= tau_s
+    document = json.loads(json.dumps(report_document(report, None, None)["effects"]))[0]["parameters"]
+    assert document["tau_s"]["u"] is document["amplitude_mm"]["u"] is None
+    assert 1000.0 < document["tau_s"]["at_least"] <= tau_s
     side = "at_least" if amplitude_mm > 0.0 else "at_most"
-    assert 0.0 < written["amplitude_mm"][side] / amplitude_mm <= 1.0
-    assert f"{written['tau_s']['value']:.4g} s, U" not in report.sentence
+    assert 0.0 < document["amplitude_mm"][side] / amplitude_mm <= 1.0
+    assert f"{document['tau_s']['value']:.4g} s, U" not in report.sentence

@@ -8,8 +8,7 @@ import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.report import DiagnosisReport, Verdict
-from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 SEED = 3
 EDGE_MM, AMPLITUDE_MM, PERIOD_MM = 0.003, 0.012, 0.2
@@ -31,9 +30,7 @@ def screwed(folder: Path, harmonic: float) -> DiagnosisReport:
         driven = u + AMPLITUDE_MM * (np.sin(angle + 0.4) + harmonic * np.sin(2.0 * angle + 1.9))
         left, right = (side * (2.0 + 3.5 * driven) + EDGE_MM * rng.standard_normal(count) for side in (-1, 1))
         lines += [f"{run},{k / 12},{u[k]},{right[k] - left[k]},{left[k]},{right[k]}" for k in range(count)]
-    (folder / "measured.csv").write_text("run,time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
-    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n0.6,8.2\n")
-    return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv")).report
+    return diagnose(*written(folder, "run,time_s,input_mm,gap_mm,left_mm,right_mm", lines, "-0.6,-0.2\n0.6,8.2")).report
 
 
 @pytest.mark.slow
@@ -57,9 +54,7 @@ def test_an_error_with_many_harmonics_is_one_cyclic_error(tmp_path: Path) -> Non
     off = sum(share * np.sin(k * angle + 0.7 * k) for k, share in enumerate(shares, start=1))
     gap = 5.0 + u + AMPLITUDE_MM * off + 3e-5 * np.random.default_rng(SEED).standard_normal(u.size)
     rows = [f"{0.03 * k},{u[k]},{gap[k]:.6f}" for k in range(u.size)]
-    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
-    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n0,5\n6,11\n")
-    report = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv")).report
+    report = diagnose(*written(tmp_path, "time_s,input_mm,gap_mm", rows, "0,5\n6,11")).report
     assert report.verdict is Verdict.NAMED
     assert report.alternatives == (("encoder_cyclic_error",),)
     amplitude = report.effects[0].parameters["amplitude_mm"]
@@ -75,9 +70,9 @@ def test_a_harmonic_is_no_play_behind_a_wave_that_drives_back(tmp_path: Path) ->
     off = 0.0363897 * (np.sin(angle) + 0.08 * np.sin(2.0 * angle + 1.0))
     gap = 3.0 + u + off + 0.00185 * np.random.default_rng(SEED).standard_normal(u.size)
     rows = [f"{0.1 * k},{u[k]},{gap[k]:.6f}" for k in range(u.size)]
-    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
-    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n0.9819258,3.9819258\n2.7290415,5.7290415\n")
-    report = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv")).report
+    report = diagnose(
+        *written(tmp_path, "time_s,input_mm,gap_mm", rows, "0.9819258,3.9819258\n2.7290415,5.7290415")
+    ).report
     assert report.alternatives == (("encoder_cyclic_error",),)
 
 

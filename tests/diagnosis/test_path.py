@@ -13,6 +13,7 @@ from fingervision.motion.encoder import on_lines
 from fingervision.motion.recorded_input import is_commanded
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 PLAY_MM, NOISE_MM = 0.026, 0.002
 TARGETS = np.arange(-20.0, 21.0, 5.0)
@@ -95,9 +96,7 @@ def test_swapped_directions_are_asked_about_and_nothing_is_named(tmp_path: Path)
 
 def moved(folder: Path, u: np.ndarray, gap: np.ndarray, rate_hz: float = 25.0) -> Diagnosis:
     rows = [f"{k / rate_hz:.4f},{x:.7f},{g:.7f}" for k, (x, g) in enumerate(zip(u, gap, strict=True))]
-    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
-    (folder / "sim.csv").write_text("input_mm,gap_mm\n-3,1\n6,10\n")
-    return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"))
+    return diagnose(*written(folder, "time_s,input_mm,gap_mm", rows, "-3,1\n6,10"))
 
 
 @pytest.mark.slow

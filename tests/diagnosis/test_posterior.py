@@ -23,6 +23,7 @@ from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from tests.benchmarks.clock import PLAY_ALONE, named_play
 from tests.benchmarks.drawn_recordings import draw
+from tests.diagnosis.tables import written
 
 EDGE_MM = 0.01
 SAMPLES = 240
@@ -38,9 +39,7 @@ def problem(tmp_path: Path) -> Problem:
     u = 0.5 * np.sin(np.linspace(0.0, 12.0, SAMPLES))
     left, right = (side * (2.0 + 3.5 * u) + EDGE_MM * rng.standard_normal(SAMPLES) for side in (-1.0, 1.0))
     lines = [f"{0.1 * k},{u[k]},{right[k] - left[k]},{left[k]},{right[k]}" for k in range(SAMPLES)]
-    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
-    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n0.6,8.2\n")
-    bench = prepare(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv"))
+    bench = prepare(*written(tmp_path, "time_s,input_mm,gap_mm,left_mm,right_mm", lines, "-0.6,-0.2\n0.6,8.2"))
     return bench.problem(bench.stacked_mm - bench.chain.stacked({}), 0, explained=True)
 
 
@@ -113,9 +112,7 @@ def test_stick_slip_alone_behind_a_noisy_record_keeps_its_covariance(tmp_path: P
     u = 0.8 * np.abs((t / 10.0 + 0.5) % 2.0 - 1.0)
     read, gap = (values + 0.003 * rng.standard_normal(t.size) for values in (u, 2.0 + 5.0 * u))
     lines = [f"{t[k]:.3f},{read[k]:.6f},{gap[k]:.6f}" for k in range(t.size)]
-    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(lines) + "\n")
-    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n-0.2,1.0\n1.0,7.0\n")
-    data = prepare(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv"))
+    data = prepare(*written(tmp_path, "time_s,input_mm,gap_mm", lines, "-0.2,1.0\n1.0,7.0"))
     problem = data.problem(data.stacked_mm - data.chain.stacked({}), 0, explained=True)
     best = fit(problem, ("stick_slip",), {"stick_slip": {"jump_mm": 0.02}}, iterations=2)
     # The prediction depends on it discontinuously, so that no derivative gives the contribution of the record.

@@ -13,6 +13,7 @@ from fingervision.domain.parameter import Estimate
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 Array = NDArray[np.float64]
 SEED = 7
@@ -52,9 +53,7 @@ def answered(
         gap = (4.0 + bent + offset_mm) * (1.0 + away * bent)
         left, right = (side * 0.5 * gap + EDGE_MM * rng.standard_normal(t.size) for side in (-1, 1))
         lines += [f"{run},{t[k]},{u[k]},{right[k] - left[k]},{left[k]},{right[k]}" for k in range(t.size)]
-    (folder / "measured.csv").write_text("run,time_s,input_mm,gap_mm,left_mm,right_mm\n" + "\n".join(lines) + "\n")
-    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.6,-0.2\n0.6,8.2\n")
-    return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv")).report
+    return diagnose(*written(folder, "run,time_s,input_mm,gap_mm,left_mm,right_mm", lines, "-0.6,-0.2\n0.6,8.2")).report
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from fingervision.diagnosis.inference.hypothesis_fit import bounded_step
 from fingervision.domain.report import Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 TARGETS_MM = np.linspace(-100.0, 100.0, 7)
 NOISE_MM = 0.003
@@ -113,9 +114,7 @@ def test_a_play_beside_an_offset_in_sixty_rows_is_no_correlated_noise(tmp_path: 
     gap = 2.05 + 6.0 * (there_and_back + np.where(rising, -0.005, 0.005))
     gap += np.random.default_rng(7).normal(0.0, 0.004, gap.size)
     rows = [f"{0.1 * k:.1f},{x},{y}" for k, (x, y) in enumerate(zip(there_and_back, gap, strict=True))]
-    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
-    (tmp_path / "simulation.csv").write_text("input_mm,gap_mm\n-0.5,-1\n1.5,11\n")
-    found = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "simulation.csv")).report
+    found = diagnose(*written(tmp_path, "time_s,input_mm,gap_mm", rows, "-0.5,-1\n1.5,11")).report
     assert found.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
     assert all({"backlash", "friction_hysteresis"} & set(names) for names in found.alternatives)
     assert found.disagreement.after_rms_mm < 0.006

@@ -7,8 +7,7 @@ import pytest
 
 from fingervision.diagnosis.diagnose import Diagnosis, diagnose
 from fingervision.domain.report import Verdict
-from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 LEVELS_MM = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0, 1.0, 2.0)
 UNEVEN_MM = (0.0, 1.0, 3.0, 3.5, 5.0, 2.0, 4.0, 1.5, 0.0, 2.5, 3.0, 1.0, 2.0)
@@ -17,9 +16,7 @@ HOLD, RATE_HZ, NOISE_MM = 44, 20.0, 0.002
 
 def diagnosed(folder: Path, gap_of: np.ndarray, input_mm: np.ndarray) -> Diagnosis:
     rows = [f"{k / RATE_HZ:.4f},{x:.6f},{gap:.6f}" for k, (x, gap) in enumerate(zip(input_mm, gap_of, strict=True))]
-    (folder / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
-    (folder / "simulation.csv").write_text("input_mm,gap_mm\n-1,0\n7,8\n")
-    return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "simulation.csv"))
+    return diagnose(*written(folder, "time_s,input_mm,gap_mm", rows, "-1,0\n7,8"))
 
 
 @pytest.mark.parametrize(
@@ -89,8 +86,6 @@ def test_the_size_of_jumps_is_found_between_the_sizes_that_signatures_try(tmp_pa
         place[k] = stands
     noise = np.random.default_rng(9).normal(0.0, 0.003, ramp.size)
     rows = [f"{t:.4f},{x:.6f},{gap:.6f}" for t, x, gap in zip(time, ramp, 2.0 + place + noise, strict=True)]
-    (tmp_path / "measured.csv").write_text("time_s,input_mm,gap_mm\n" + "\n".join(rows) + "\n")
-    (tmp_path / "simulation.csv").write_text("input_mm,gap_mm\n-1,1\n4,6\n")
-    report = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "simulation.csv")).report
+    report = diagnose(*written(tmp_path, "time_s,input_mm,gap_mm", rows, "-1,1\n4,6")).report
     assert report.verdict in (Verdict.NAMED, Verdict.AMBIGUOUS)
     assert report.effects[0].parameters["jump_mm"].value == pytest.approx(0.06, rel=0.01)

@@ -8,9 +8,8 @@ import pytest
 
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.report import DiagnosisReport
-from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model
 from fingervision.storage.summary_json import report_document
+from tests.diagnosis.tables import written
 
 EDGE_MM = 0.004
 SEED = 5
@@ -43,10 +42,8 @@ def rows(mirror: bool) -> list[Row]:
 
 def asked(folder: Path, table: list[Row], columns: tuple[str, ...] = COLUMNS) -> DiagnosisReport:
     picked = [COLUMNS.index(column) for column in columns]
-    lines = [",".join(columns), *(",".join(row[k] for k in picked) for row in table)]
-    (folder / "measured.csv").write_text("\n".join(lines) + "\n")
-    (folder / "sim.csv").write_text("input_mm,gap_mm\n-0.8,-1.6\n0.8,9.6\n")
-    return diagnose(read_measured_table(folder / "measured.csv"), read_model(folder / "sim.csv"), seed=SEED).report
+    rows = (",".join(row[k] for k in picked) for row in table)
+    return diagnose(*written(folder, ",".join(columns), rows, "-0.8,-1.6\n0.8,9.6"), seed=SEED).report
 
 
 def told(report: DiagnosisReport) -> str:

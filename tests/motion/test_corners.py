@@ -12,8 +12,7 @@ from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
 from fingervision.domain.effect import History, InputPath
 from fingervision.models.table import TableModel
 from fingervision.motion.corners import Corner, corners
-from fingervision.storage.measured_table import read_measured_table
-from fingervision.storage.model_toml import read_model
+from tests.diagnosis.tables import written
 
 PERIOD_S, EVERY_S = 8.0, 0.04
 
@@ -149,9 +148,7 @@ def test_strokes_that_stop_for_a_moment_have_no_end_stop(tmp_path: Path) -> None
     noise_mm = 0.0005 * np.random.default_rng(4).standard_normal(rows.size)
     gap_mm = 3.0 + 7.7 * played(input_mm, 0.05)[rows] + noise_mm
     lines = [f"{fine_s[i]:.3f},{input_mm[i]:.5f},{gap:.5f}" for i, gap in zip(rows, gap_mm, strict=True)]
-    (tmp_path / "measured.csv").write_text("\n".join(["time_s,input_mm,gap_mm", *lines]))
-    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n-0.5,-0.85\n2,18.4\n")
-    report = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv")).report
+    report = diagnose(*written(tmp_path, "time_s,input_mm,gap_mm", lines, "-0.5,-0.85\n2,18.4")).report
     assert [effect.name for effect in report.effects] == ["backlash"]
     play = report.effects[0].parameters["play_mm"]
     assert play.value == pytest.approx(0.05, abs=0.0005)  # without the places of the reversals, 3 um too wide
@@ -165,9 +162,7 @@ def test_a_play_as_small_as_the_motion_between_two_rows_is_no_delay(tmp_path: Pa
     rows = np.arange(13, fine_s.size, 40)
     gap_mm = 3.0 + 0.8 * place_mm[rows] + 0.002 * np.random.default_rng(8).standard_normal(rows.size)
     lines = [f"{fine_s[i]:.3f},{input_mm[i]:.5f},{gap:.5f}" for i, gap in zip(rows, gap_mm, strict=True)]
-    (tmp_path / "measured.csv").write_text("\n".join(["time_s,input_mm,gap_mm", *lines]))
-    (tmp_path / "sim.csv").write_text("input_mm,gap_mm\n-0.5,2.6\n3,5.4\n")
-    report = diagnose(read_measured_table(tmp_path / "measured.csv"), read_model(tmp_path / "sim.csv")).report
+    report = diagnose(*written(tmp_path, "time_s,input_mm,gap_mm", lines, "-0.5,2.6\n3,5.4")).report
     assert [effect.name for effect in report.effects] == ["backlash"]
     play = report.effects[0].parameters["play_mm"]
     assert play.value == pytest.approx(play_mm, abs=3.0 * (play.u or 0.0))
