@@ -1,6 +1,5 @@
 """A camera with gamma, from its calibration to the gap: known, assumed, measured, and another camera's."""
 
-import csv
 import json
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from tests.benchmarks.camera_artefacts.classes import BELOW_PX, NOISE, SIZE_PX
 from tests.benchmarks.camera_artefacts.electronics import noisy, power_law, stored
 from tests.benchmarks.camera_artefacts.optics import Surface, light_on_sensor
 from tests.benchmarks.camera_artefacts.scene import Finger, true_gap
+from tests.csv_rows import csv_rows
 
 PX_PER_MM = 34.0
 LIGHT = Surface(ground=0.7, finger=0.06)
@@ -67,8 +67,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str], li
 def measured(folder: Path, calibration: Path, out: Path, *more: str | Path) -> tuple[list[dict[str, str]], dict]:
     result = run(measure, folder / "frames", "--rate-hz", "25", "--calibration", calibration, "--out", out, *more)
     assert result.exit_code == 0, result.output
-    with (out / "gaps.csv").open() as file:
-        return list(csv.DictReader(file)), json.loads((out / "summary.json").read_text())
+    return csv_rows(out / "gaps.csv"), json.loads((out / "summary.json").read_text())
 
 
 def test_a_calibration_with_the_same_camera_takes_the_bias_away(

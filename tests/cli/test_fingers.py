@@ -1,6 +1,5 @@
 """--fingers, the polarity of every frame, and the sentence where the frames disagree."""
 
-import csv
 import json
 from pathlib import Path
 
@@ -11,14 +10,14 @@ from click.testing import CliRunner
 from fingervision.cli.measure import command
 from tests.benchmarks.camera_artefacts.classes import plain
 from tests.benchmarks.camera_artefacts.optics import Surface
+from tests.csv_rows import csv_rows
 
 
 def run(folder: Path, *more: str) -> tuple[list[str], dict]:
     out = folder / "m"
     arguments = [str(folder / "*.png"), "--rate-hz", "25", "--px-per-mm", "34", "--out", str(out), *more]
     CliRunner().invoke(command, arguments)
-    with (out / "gaps.csv").open() as file:
-        return [row["fingers"] for row in csv.DictReader(file)], json.loads((out / "summary.json").read_text())
+    return [row["fingers"] for row in csv_rows(out / "gaps.csv")], json.loads((out / "summary.json").read_text())
 
 
 def test_frames_that_disagree_about_the_fingers(tmp_path: Path) -> None:

@@ -1,4 +1,3 @@
-import csv
 import json
 import re
 from pathlib import Path
@@ -14,6 +13,7 @@ from fingervision.models.grip import Part, first_grip_mm
 from fingervision.models.kinds import build_model, kinds
 from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
+from tests.csv_rows import csv_rows
 
 NOTCH = 0.02
 """Neuber's factor and the frame's force beside finite elements."""
@@ -48,13 +48,11 @@ def test_all_models_side_by_side(tmp_path: Path) -> None:
     assert rows["lumped"]["peak_stress_mpa_per_mm"] == pytest.approx(19.07, rel=NOTCH)
     assert rows["stiffness_matrix"]["peak_stress_mpa_per_mm"] == pytest.approx(19.07, rel=NOTCH)
     for kind in rows:
-        with (tmp_path / "o" / kind / "simulation.csv").open() as file:
-            table = list(csv.DictReader(file))
+        table = csv_rows(tmp_path / "o" / kind / "simulation.csv")
         assert [float(row["input_mm"]) for row in table] == [-0.5, 0.0, 1.5]
         slope = (float(table[2]["gap_mm"]) - float(table[0]["gap_mm"])) / 2.0
         assert slope == pytest.approx(rows[kind]["gap_per_input"], rel=1e-6)
-    with (tmp_path / "o" / "modes.csv").open() as file:
-        modes = list(csv.DictReader(file))
+    modes = csv_rows(tmp_path / "o" / "modes.csv")
     assert len(modes) == 3 * 3 * 2
     found = {(row["kind"], row["family"], row["number"]): float(row["frequency_hz"]) for row in modes}
     # Plane stress has 44.6 and 357.9 Hz; the width of the hinges adds half its 2.6 % of force to the first.
@@ -200,8 +198,7 @@ def test_a_part_is_gripped(tmp_path: Path) -> None:
     touch = first_grip_mm(model, Part(3.0))
     assert touch is not None
     assert f"lumped: a part of 3 mm (50 N/mm) is touched at {touch:.4g} mm of input" in output
-    with (tmp_path / "grip.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(tmp_path / "grip.csv")
     held = [row for row in rows if row["held_width_mm"]]
     assert held
     for row in held:
@@ -235,8 +232,7 @@ def test_endurance_and_warmth_where_the_material_states_them(tmp_path: Path) -> 
     given = drive(tmp_path / "drive.csv", [-0.5, 1.5])
     output = run(tmp_path / "g.toml", "--kind", "lumped", "--drive", given, "--out", tmp_path)
     assert "Endurance between -0.5 and 1.5 mm (lumped, the material's S-N line, no scatter): about" in output
-    with (tmp_path / "models.csv").open() as file:
-        (row,) = csv.DictReader(file)
+    (row,) = csv_rows(tmp_path / "models.csv")
     # From -0.5 to 1.5 mm: as much up and down as by 1 mm, about half of that; some 24 MPa fully reversed.
     by_mm = float(row["peak_stress_mpa_per_mm"])
     assert by_mm == pytest.approx(19.07, rel=NOTCH)

@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 from fingervision.cli._model_figures import FigureStyle, extent_mm
 from fingervision.cli.model import command
 from fingervision.models.finite_element import MechanismPlate
-from fingervision.storage.mechanism_toml import read_mechanism
+from tests.drawings import drawing
 
 DRAWING = """
 plate_mm = 4.0
@@ -75,8 +75,7 @@ def test_every_figure_is_written_as_a_vector_too(tmp_path: Path) -> None:
 
 
 def test_the_deformed_shape_is_magnified_by_the_stated_factor(tmp_path: Path) -> None:
-    (tmp_path / "mechanism.toml").write_text(DRAWING)
-    plate = MechanismPlate(read_mechanism(tmp_path / "mechanism.toml"))
+    plate = MechanismPlate(drawing(tmp_path, DRAWING))
     moved = plate.state(1.0).displacement_mm
     high = [extent_mm(plate.plate, moved)[1][1]]
     with click.Context(command) as context:

@@ -1,6 +1,5 @@
 """`fingervision model` in motion: --drive, --frequency, --modes, and what they refuse."""
 
-import csv
 import json
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
+from tests.csv_rows import csv_rows
 
 ROOT = Path(__file__).parents[2]
 GRIPPER = ROOT / "sample_frames" / "paper" / "gripper.toml"
@@ -93,8 +93,7 @@ def test_the_force_channel_of_diagnose_works_from_a_model(tmp_path: Path) -> Non
 
 def test_frequency_response_peaks_at_the_modes(tmp_path: Path) -> None:
     output = run(GRIPPER, "--kind", "lumped", "--frequency", "1:500", "--damping", "modal:0.01", "--out", tmp_path)
-    with (tmp_path / "frequency.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(tmp_path / "frequency.csv")
     f = np.array([float(row["frequency_hz"]) for row in rows])
     columns = ("gap_per_input_mm_mm", "gap_per_force_mm_n")
     by_input, by_force = (np.array([float(row[column]) for row in rows]) for column in columns)
@@ -111,8 +110,7 @@ def test_frequency_response_peaks_at_the_modes(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_modes_up_to_a_frequency_and_their_film(tmp_path: Path) -> None:
     run(GRIPPER, "--kind", "lumped", "--modes", "1500Hz", "--film", "--out", tmp_path)
-    with (tmp_path / "modes.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(tmp_path / "modes.csv")
     values = [float(row["frequency_hz"]) for row in rows]
     assert max(values) < 1500.0
     assert [row["family"] for row in rows].count("drive held") == 2
@@ -215,8 +213,7 @@ def test_uncertain_numbers_give_every_figure_its_own(tmp_path: Path) -> None:
     stated = GRIPPER.read_text().replace("youngs_modulus_mpa = 1650.0", modulus)
     (tmp_path / "g.toml").write_text(stated.replace("l2_mm = 17.82", "l2_mm = { value = 17.82, u = 0.1 }"))
     output = run(tmp_path / "g.toml", "--kind", "lumped", "--out", tmp_path)
-    with (tmp_path / "uncertainty.csv").open() as file:
-        rows = {row["figure"]: row for row in csv.DictReader(file)}
+    rows = {row["figure"]: row for row in csv_rows(tmp_path / "uncertainty.csv")}
     # The slope goes with the lever alone (5.3 % a mm), stress with the modulus, frequency with its root.
     assert float(rows["gap_per_input"]["u"]) == pytest.approx(0.0053 * 7.75, rel=0.05)
     assert rows["gap_per_input"]["first"] == "lever.l2_mm"

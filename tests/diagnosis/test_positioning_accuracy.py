@@ -1,6 +1,5 @@
 """Quantities of ISO 230-2: published values of real stages, closed formulas, a second program, symmetries, faults."""
 
-import csv
 import json
 import math
 import statistics
@@ -20,6 +19,7 @@ from fingervision.diagnosis.report.positioning_of_data import (
     positioning_words,
 )
 from fingervision.motion.repeated_targets import RepeatedTargets
+from tests.csv_rows import csv_rows
 
 RIGS = Path(__file__).parents[3] / "shared" / "real" / "rigs"
 DIGIT = 0.5e-5
@@ -49,8 +49,7 @@ def values(*columns: object) -> dict[str, float | None]:
 @pytest.mark.skipif(not RIGS.exists(), reason="the measured tables of real rigs are not here (../shared/real/rigs)")
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_published_reports_are_recomputed_to_the_digit(name: str) -> None:
-    with (RIGS / name / "measured.csv").open() as file:
-        rows = [row for row in csv.DictReader(file) if row["gap_mm"]]
+    rows = [row for row in csv_rows(RIGS / name / "measured.csv") if row["gap_mm"]]
     target = np.array([float(row["input_mm"]) for row in rows])
     gap = np.array([float(row["gap_mm"]) for row in rows])
     each = np.unique(target).size

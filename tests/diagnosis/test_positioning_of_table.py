@@ -1,6 +1,5 @@
 """From a table and its model to the quantities of a published report and the causes of each quantity."""
 
-import csv
 import json
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from fingervision.diagnosis.report.positioning_of_data import (
 from fingervision.motion.repeated_targets import NoRepeatedTargets
 from fingervision.storage.model_toml import read_model
 from fingervision.tables.read import read_measured_table
+from tests.csv_rows import csv_rows
 
 RIGS = Path(__file__).parents[3] / "shared" / "real" / "rigs"
 PATH = np.tile(np.concatenate([[-0.5], np.arange(5.0), [4.5], np.arange(5.0)[::-1]]), 5)
@@ -30,8 +30,7 @@ SIDE = np.tile(np.repeat([1, -1], 5), 5)
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:
-    with path.open() as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(path)
     return {
         name: np.array([float(row[name] or "nan") for row in rows])
         for name in ("time_s", "input_mm", "gap_mm")

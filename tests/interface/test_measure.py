@@ -1,6 +1,5 @@
 """`fingervision.measure`: the command's numbers, from any picture; what cannot be meant is refused by name."""
 
-import csv
 from pathlib import Path
 
 import cv2
@@ -12,6 +11,7 @@ import fingervision as fv
 from fingervision.cli import cli
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
 from fingervision.rendering import Camera, render, two_fingers
+from tests.csv_rows import csv_rows
 
 SAMPLES = Path(__file__).parents[2] / "sample_frames"
 TABLE1 = SAMPLES / "table1"
@@ -241,8 +241,7 @@ def test_turns_into_tables() -> None:
 def test_the_table_of_pandas_is_that_of_the_file(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
     measured = fv.measure(picture(), px_per_mm=SCALE)
-    with (measured.save(tmp_path / "out") / "gaps.csv").open() as file:
-        (row,) = csv.DictReader(file)
+    (row,) = csv_rows(measured.save(tmp_path / "out") / "gaps.csv")
     values = measured.to_dataframe().iloc[0]
     assert float(row["gap_mm"]) == pytest.approx(values["gap_mm"], abs=1e-7)
     assert row["status"] == values["status"]

@@ -1,6 +1,5 @@
 """Live views as processes, a network camera that ffmpeg plays, and a browser."""
 
-import csv
 import json
 import os
 import re
@@ -30,6 +29,7 @@ from fingervision.live.playback.playback import Playback
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
+from tests.csv_rows import csv_rows
 from tests.waiting import free_port
 
 # It is for the system's Python.
@@ -185,8 +185,7 @@ def camera(pictures: Path) -> Iterator[NetworkCamera]:
 @pytest.fixture
 def rows() -> Callable[[Path], list[dict[str, str]]]:
     def read(path: Path) -> list[dict[str, str]]:
-        with path.open(newline="") as file:
-            return list(csv.DictReader(file))
+        return csv_rows(path)
 
     return read
 

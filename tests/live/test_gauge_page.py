@@ -1,6 +1,5 @@
 """Gauges drawn on a recording: valid gauges are stored, invalid ones refused, and readings equal those of `measure`."""
 
-import csv
 import json
 import subprocess
 import sys
@@ -25,6 +24,7 @@ from fingervision.live.playback.gauge_board import ChangedMeanwhileError, FieldE
 from fingervision.live.playback.gauge_following import GaugesBeside, put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
+from tests.csv_rows import csv_rows
 from tests.gauges.drawn import bar, drawn, half_plane, seen
 from tests.live.browser import browser, opened, says, shown, typed
 from tests.live.test_page_layout import findings
@@ -250,8 +250,7 @@ def test_readings_are_those_of_measure(opened_on: Opened, frames: Path, tmp_path
     obey(view, {"do": "gauges_save"})
     options = ["--px-per-mm", "20", "--rate-hz", "25", "--gauges", str(path), "--out", str(out)]
     subprocess.run([sys.executable, "-m", "fingervision", "measure", str(frames), *options], check=True)
-    with (out / "gauges.csv").open(encoding="utf-8", newline="") as file:
-        rows = [list(row.values())[1:] for row in csv.DictReader(file)]
+    rows = [list(row.values())[1:] for row in csv_rows(out / "gauges.csv")]
     obey(view, {"do": "seek", "frame": FRAMES - 1})
     until(lambda: beside.following.frames >= FRAMES, lambda: beside.following.trouble)
     found = []
@@ -347,8 +346,7 @@ def test_gauges_are_drawn_dragged_typed_and_saved_in_the_page(
     says(page, "2 gauges saved")
     command = ["measure", str(frames), "--rate-hz", "25", "--px-per-mm", "20", "--gauges", str(path)]
     subprocess.run([sys.executable, "-m", "fingervision", *command, "--out", str(tmp_path / "measured")], check=True)
-    with (tmp_path / "measured" / "gauges.csv").open(encoding="utf-8", newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["gauge"] == "lever"]
+    rows = [row for row in csv_rows(tmp_path / "measured" / "gauges.csv") if row["gauge"] == "lever"]
     page.locator("#scrub").fill("7")
     words = reads(page, "lever", f"position {float(rows[7]['value']):.4f} mm")
     assert "ok" in words

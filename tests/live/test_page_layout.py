@@ -1,6 +1,5 @@
 """Layout of the page on every screen size: what fits, what can be reached, and results of an accessibility checker."""
 
-import csv
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +17,7 @@ from fingervision.live.choices import Choices
 from fingervision.live.server import Page, bound
 from fingervision.live.session import Session
 from fingervision.rendering import Camera, render, two_fingers
+from tests.csv_rows import csv_rows
 from tests.live.browser import browser, downloaded, keep, opened, says, shown, typed
 from tests.live.test_camera_controls import AllControls
 
@@ -92,8 +92,7 @@ def test_live_a_run_folder_and_a_recording_fit_every_screen(
     page.close()
     (run,) = view.runs()
     assert view.stop() == 0
-    with (run / "gaps.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(run / "gaps.csv")
     for name, source, options in (("run", run, ()), ("recording", run / "video.mp4", ("--px-per-mm", "34"))):
         address = live(source, *options, "--port", "0").address
         look_on_every_screen(opened, address, name)

@@ -1,6 +1,5 @@
 """With a drawing, the fingers and pairs of a whole mechanism are measured without a stated region."""
 
-import csv
 from pathlib import Path
 
 import cv2
@@ -12,6 +11,7 @@ from fingervision.cli import cli
 from fingervision.models.mechanism_bodies import bodies_of
 from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.films_of_mechanisms import DRAWINGS, View
+from tests.csv_rows import csv_rows
 
 DRAWING = DRAWINGS / "leaf_tweezers.toml"
 PX_PER_MM, REST_MM = 10.0, {"gap": 3.0, "heels": 6.0}
@@ -47,10 +47,8 @@ def test_a_film_of_a_whole_mechanism_gives_its_gap_and_pairs_in_every_frame(tmp_
     given = ["measure", str(film), "--rate-hz", "25", "--px-per-mm", str(PX_PER_MM), "--mechanism", str(DRAWING)]
     done = CliRunner().invoke(cli, [*given, "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
-    with (tmp_path / "out" / "gaps.csv").open() as file:
-        gaps = list(csv.DictReader(file))
-    with (tmp_path / "out" / "gauges.csv").open() as file:
-        pairs = list(csv.DictReader(file))
+    gaps = csv_rows(tmp_path / "out" / "gaps.csv")
+    pairs = csv_rows(tmp_path / "out" / "gauges.csv")
     assert [row["status"] for row in gaps] == ["ok"] * len(CLOSED_MM)
     for row, closed in zip(gaps, CLOSED_MM, strict=True):
         assert float(row["gap_mm"]) == pytest.approx(REST_MM["gap"] - 2.0 * closed, abs=0.006)

@@ -1,6 +1,5 @@
 """A complete measurement: known gaps are measured correctly, and the files describe the measurement."""
 
-import csv
 import json
 import signal
 from collections.abc import Iterator
@@ -26,6 +25,7 @@ from fingervision.measuring.task import Task
 from fingervision.measuring.words import result_sentences
 from fingervision.rendering import Camera, Scene, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
+from tests.csv_rows import csv_rows
 
 PX_PER_MM = 20.0
 BELOW_PX = 0.3 * PX_PER_MM
@@ -47,8 +47,7 @@ def rendered(scenes: list[Scene], seed: int = 0, rate_hz: float | None = 25.0) -
 
 
 def rows_of(measured: Measured) -> list[dict[str, str]]:
-    with measured.folder.gaps.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    return csv_rows(measured.folder.gaps)
 
 
 @pytest.mark.parametrize(

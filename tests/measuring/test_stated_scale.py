@@ -1,6 +1,5 @@
 """A scale stated with its uncertainty, which contributes to the gap's uncertainty like that of a calibration."""
 
-import csv
 import json
 import sys
 from pathlib import Path
@@ -20,6 +19,7 @@ from fingervision.rendering import Camera, render, two_fingers
 from fingervision.storage.calibration_json import read_calibration, write_calibration
 from fingervision.storage.settings_toml import read_settings, write_settings
 from tests.clips import FFV1, write_clip
+from tests.csv_rows import csv_rows
 
 PX_PER_MM, U_PX_PER_MM = 20.0, 0.3
 SIZE_PX = (240, 200)
@@ -70,8 +70,7 @@ def test_the_command_writes_it(clip: Path, tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(SystemExit) as ended:
         main()
     assert not ended.value.code
-    with (tmp_path / "out" / "gaps.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(tmp_path / "out" / "gaps.csv")
     assert all(float(row["u_gap_mm"]) > 0.3 / 20.0 * float(row["gap_mm"]) for row in rows)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["scale"]["u_px_per_mm"] == 0.3

@@ -13,6 +13,7 @@ from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_figures import mechanism_figures
 from fingervision.storage.mechanism_toml import read_mechanism
+from tests.drawings import drawing
 from tests.models.coarse import coarse_elements
 
 COLUMN = """
@@ -50,18 +51,14 @@ FREE = brentq(lambda x: x * np.tan(x) - LENGTH / HEAD, 0.1, 1.5) ** 2
     ],
 )
 def test_a_column_buckles_at_the_force_of_euler(ends: str, factor: float, tmp_path: Path) -> None:
-    path = tmp_path / "column.toml"
-    path.write_text(COLUMN + ends + "\nforce_n_per_input = 0.1\n")
-    model = coarse_elements(read_mechanism(path))
+    model = coarse_elements(drawing(tmp_path, COLUMN + ends + "\nforce_n_per_input = 0.1\n", "column"))
     _, pushed = model.buckling_inputs_mm()
     # The elastic bodies let the ends of the leaf turn a little: it is longer by about its thickness.
     assert 0.1 * pushed == pytest.approx(factor * STIFFNESS / (LENGTH + 0.4) ** 2, rel=0.01)
 
 
 def test_a_column_pushed_by_a_stage_buckles_at_the_same_force(tmp_path: Path) -> None:
-    path = tmp_path / "column.toml"
-    path.write_text(COLUMN + 'across = "held"\n')
-    model = coarse_elements(read_mechanism(path))
+    model = coarse_elements(drawing(tmp_path, COLUMN + 'across = "held"\n', "column"))
     pushed = model.buckling_inputs_mm()[1]
     assert mechanism_figures(model)["input_at_buckling_mm"] == pytest.approx(pushed)
     force = pushed * model.stiffness_n_mm
@@ -82,8 +79,8 @@ def test_leaves_that_bend_do_not_buckle_before_they_yield() -> None:
 def test_a_leaf_that_ends_at_the_bodies_edges_is_one_that_ends_inside(
     kind: Callable[..., ElasticMechanism], tmp_path: Path
 ) -> None:
-    path, forces = tmp_path / "column.toml", []
+    forces = []
     for half_mm in ("30.0", "30.5"):
-        path.write_text(COLUMN.replace("30.5", half_mm).replace("[0, -1]", "[1, 0]"))
-        forces.append(kind(read_mechanism(path)).stiffness_n_mm)
+        text = COLUMN.replace("30.5", half_mm).replace("[0, -1]", "[1, 0]")
+        forces.append(kind(drawing(tmp_path, text)).stiffness_n_mm)
     assert forces[0] == pytest.approx(forces[1], rel=0.002)

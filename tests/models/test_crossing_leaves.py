@@ -7,7 +7,7 @@ import pytest
 from fingervision.domain.errors import DataError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
-from fingervision.storage.mechanism_toml import read_mechanism
+from tests.drawings import drawing
 
 CROSS = """
 plate_mm = 6.0
@@ -41,9 +41,7 @@ SOLID_N_MM = 6.9557
 
 
 def test_leaves_that_cross_are_fused_as_in_three_dimensions(tmp_path: Path) -> None:
-    path = tmp_path / "cross.toml"
-    path.write_text(CROSS)
-    mechanism = read_mechanism(path)
+    mechanism = drawing(tmp_path, CROSS, "cross")
     assert mechanism.fused == (("a", "a mirrored", pytest.approx((0.0, 10.0))),)
     assert [flexure.name for flexure in mechanism.flexures] == [
         "a part 1", "a part 2", "a mirrored part 1", "a mirrored part 2",
@@ -53,10 +51,7 @@ def test_leaves_that_cross_are_fused_as_in_three_dimensions(tmp_path: Path) -> N
 
 
 def test_a_part_ends_in_the_crossing_and_a_leaf_does_not_end_in_the_void(tmp_path: Path) -> None:
-    path = tmp_path / "cross.toml"
-    path.write_text(CROSS.replace("mirror_x_mm = 0", "mirror_x_mm = 1"))
-    ((_, _, place),) = read_mechanism(path).fused
+    ((_, _, place),) = drawing(tmp_path, CROSS.replace("mirror_x_mm = 0", "mirror_x_mm = 1")).fused
     assert place == pytest.approx((1.0, 11.0))
-    path.write_text(CROSS.replace("sqrt(2) + 1", "sqrt(2) - 3"))
     with pytest.raises(DataError, match=r"1\.945"):
-        read_mechanism(path)
+        drawing(tmp_path, CROSS.replace("sqrt(2) + 1", "sqrt(2) - 3"))

@@ -15,7 +15,7 @@ from fingervision.models.elastic_mechanism import ElasticMechanism
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Face, Mechanism
 from fingervision.models.rigid_bodies import RigidBodies
-from fingervision.storage.mechanism_toml import read_mechanism
+from tests.drawings import drawing
 from tests.models.coarse import coarse_elements
 
 Kind = Callable[..., ElasticMechanism]
@@ -49,9 +49,7 @@ direction = [0, 1]
 
 
 def lever(folder: Path, box: str, how: str) -> Mechanism:
-    path = folder / "mechanism.toml"
-    path.write_text(LEVER.format(box=box, how=how))
-    return read_mechanism(path)
+    return drawing(folder, LEVER.format(box=box, how=how))
 
 
 def quadrilaterals_n_mm(x0: float, x1: float, *, held: bool) -> float:
@@ -170,9 +168,8 @@ def test_drives_and_rails_that_agree_with_a_rigid_motion_are_computed(tmp_path: 
     beside = "[[slide]]\nbox_mm = [60, 60, 5, 5.5]\nholds = 'x'"
     assert coarse_elements(lever(tmp_path, "40, 50, 10, 10", f"{ROD}\n{beside}")).stiffness_n_mm > 0.0
     both = f"{ROD}\nname = 'left'\n[[drive]]\nname = 'right'\nbox_mm = [52, 58, 10, 10]\ndirection = [0, 1]\n{ROD}"
-    path = tmp_path / "mechanism.toml"
-    path.write_text(LEVER.replace("[drive]", "[[drive]]").format(box="40, 50, 10, 10", how=both))
-    assert coarse_elements(read_mechanism(path)).stiffness_n_mm > 0.0
+    together = drawing(tmp_path, LEVER.replace("[drive]", "[[drive]]").format(box="40, 50, 10, 10", how=both))
+    assert coarse_elements(together).stiffness_n_mm > 0.0
 
 
 def test_a_body_that_bends_at_a_part_without_a_name_is_not_held(tmp_path: Path) -> None:
@@ -181,9 +178,7 @@ def test_a_body_that_bends_at_a_part_without_a_name_is_not_held(tmp_path: Path) 
     bodies = "[[body]]\nname='foot'\nbox_mm=[0,10,-30,10]\n" + ring.format(r=20.5, cut="false")
     bodies += ring.format(r=19.5, cut="true") + "[[body]]\nname='stem'\nbox_mm=[5,16,-22,-16]\n"
     text = LEVER.replace('[[body]]\nname = "foot"\nbox_mm = [0, 10, 0, 10]\n', bodies)
-    path = tmp_path / "mechanism.toml"
-    path.write_text(text.format(box="35.5, 40, -40, -39", how=ROD))
-    curved = coarse_elements(read_mechanism(path))
+    curved = coarse_elements(drawing(tmp_path, text.format(box="35.5, 40, -40, -39", how=ROD)))
     assert 0.0 < curved.stiffness_n_mm < 10.0
 
 
@@ -252,9 +247,7 @@ def test_inputs_that_differ_in_their_last_digits_do_not_spoil_the_next_one(tmp_p
 
 
 def pinned(folder: Path, how: str) -> Mechanism:
-    path = folder / "mechanism.toml"
-    path.write_text(LEVER.replace("box_mm = [{box}]\n", "").format(how=how))
-    return read_mechanism(path)
+    return drawing(folder, LEVER.replace("box_mm = [{box}]\n", "").format(how=how))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -286,8 +279,7 @@ body = [{ box_mm = [0, 20.2, -0.5, 0.5] }, { box_mm = [21.8, 30, -3, 3] }]
 drive = { box_mm = [19, 20, 0.5, 0.5], direction = [0, 1], across = "free" }
 flexure = [{ name = "h", kind = "leaf", at_mm = [21, 0], axis_deg = 0, thickness_mm = 0.3, half_length_mm = 1 }]
 """
-    (tmp_path / "beam.toml").write_text(text)
-    mechanism = read_mechanism(tmp_path / "beam.toml")
+    mechanism = drawing(tmp_path, text, "beam")
     for kind in (MechanismFrame, coarse_elements):
         plane = kind(mechanism, width_effect=False)
         assert plane.stiffness_n_mm == pytest.approx(3.0 * 70000.0 * 5.0 / 12.0 / 19.5**3, rel=0.02)
@@ -317,8 +309,7 @@ def held_body(folder: Path, arm_mm: float, across_mm: float) -> Mechanism:
     if arm_mm > 2.0:
         bodies, foot = f"{{ box_mm = [0, 2, 0, {arm_mm}] }}, {bodies}", [0.0, 2.0, 0.0, 0.0]
     face = [across_mm - 1.0, across_mm, arm_mm, arm_mm]
-    (folder / "held.toml").write_text(HELD.format(foot=foot, bodies=bodies, x=f"{across_mm}", y=f"{y}", face=face))
-    return read_mechanism(folder / "held.toml")
+    return drawing(folder, HELD.format(foot=foot, bodies=bodies, x=f"{across_mm}", y=f"{y}", face=face), "held")
 
 
 @pytest.mark.parametrize("kind", [coarse_elements, MechanismFrame])

@@ -15,8 +15,8 @@ from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.strips import necks_of
 from fingervision.storage.gripper_toml import read_gripper
-from fingervision.storage.mechanism_toml import read_mechanism
 from fingervision.storage.outline_file import write_outline
+from tests.drawings import drawing
 from tests.models.coarse import coarse_elements
 
 ezdxf = pytest.importorskip("ezdxf")
@@ -55,16 +55,10 @@ fillet_mm = 1.5
 """
 
 
-def drawn(folder: Path, text: str, name: str = "mechanism") -> Mechanism:
-    path = folder / f"{name}.toml"
-    path.write_text(text)
-    return read_mechanism(path)
-
-
 def read_again(folder: Path, cuts: str, ending: str = "dxf") -> Mechanism:
     """The drawing whose body is the outline that the product exports."""
-    write_outline(folder / f"part.{ending}", drawn(folder, BEAM + cuts))
-    return drawn(folder, BEAM.replace("box_mm = [0, 40, 0, 10]", f'outline = "part.{ending}"'), "again")
+    write_outline(folder / f"part.{ending}", drawing(folder, BEAM + cuts))
+    return drawing(folder, BEAM.replace("box_mm = [0, 40, 0, 10]", f'outline = "part.{ending}"'), "again")
 
 
 @pytest.mark.parametrize("ending", ["dxf", "svg"])
@@ -105,7 +99,7 @@ at_mm = [{tip_x - left_mm}, {tip_y}]
 name = "gap"
 of = ["left", "right"]
 """
-    again = drawn(tmp_path, text)
+    again = drawing(tmp_path, text)
     assert [flexure.name for flexure in again.strips] == [f"notch {n}" for n in range(1, 5)]
     for hinge in whole.flexures:
         own = min(again.strips, key=lambda f: np.hypot(*np.subtract(f.at_mm, np.subtract(hinge.at_mm, (left_mm, 0)))))
@@ -148,7 +142,7 @@ box_mm = [-10, -10, 30, 40]
 direction = [1, 0]
 across = "free"
 """
-    found = drawn(tmp_path, HEAD + faces + '[[body]]\noutline = "four.dxf"\n')
+    found = drawing(tmp_path, HEAD + faces + '[[body]]\noutline = "four.dxf"\n')
     assert sorted((round(f.at_mm[0], 9) + 0.0, round(f.at_mm[1], 9)) for f in found.strips) == [
         (x, y) for x in (0.0, 30.0) for y in notches
     ]
@@ -162,7 +156,7 @@ across = "free"
             f"thickness_mm = {t}\nradius_mm = {radius}\n"
             for y in notches
         )
-    other = drawn(tmp_path, HEAD + faces + named)
+    other = drawing(tmp_path, HEAD + faces + named)
     for kind in (MechanismPlate, MechanismFrame):
         ours, theirs = kind(found), kind(other)
         assert ours.stiffness_n_mm == pytest.approx(theirs.stiffness_n_mm, rel=3e-4)
@@ -177,13 +171,13 @@ def test_a_tilted_elliptic_notch_in_arcs_is_that_ellipse(tmp_path: Path) -> None
     assert (notch.half_length_mm, notch.depth_mm) == pytest.approx((6.0, 3.6), rel=1e-3)
     assert notch.thickness_mm == pytest.approx(2.0 * (np.hypot(4.0, 1.0) - 3.6), rel=1e-3)
     assert notch.axis_deg % 180.0 == pytest.approx(14.0362, abs=1e-2)
-    again, cut = (MechanismFrame(read_again(tmp_path, TILTED)), MechanismFrame(drawn(tmp_path, BEAM + TILTED)))
+    again, cut = (MechanismFrame(read_again(tmp_path, TILTED)), MechanismFrame(drawing(tmp_path, BEAM + TILTED)))
     assert again.stiffness_n_mm == pytest.approx(cut.stiffness_n_mm, rel=1e-3)
 
 
 def test_a_short_neck_between_fillets_is_a_flexure(tmp_path: Path) -> None:
     """It is as long as thick between its fillets, which is less than two thicknesses without them."""
-    again, named = read_again(tmp_path, SHORT), drawn(tmp_path, BEAM + SHORT)
+    again, named = read_again(tmp_path, SHORT), drawing(tmp_path, BEAM + SHORT)
     (strip,) = again.strips
     assert (strip.thickness_mm, strip.half_length_mm, strip.fillet_mm) == pytest.approx((1.0, 2.0, 1.5))
     for kind in (coarse_elements, MechanismFrame):
@@ -198,7 +192,7 @@ def test_a_notch_from_one_side_is_within_its_stated_errors(
     tmp_path: Path, cuts: str, plate_mm: float, force_n: float, stress_mpa: float
 ) -> None:
     """Force and largest von Mises stress per 1 mm at any depth, by wedge elements of CalculiX."""
-    mechanism = drawn(tmp_path, BEAM.replace("plate_mm = 4.0", f"plate_mm = {plate_mm}") + cuts)
+    mechanism = drawing(tmp_path, BEAM.replace("plate_mm = 4.0", f"plate_mm = {plate_mm}") + cuts)
     (notch,) = mechanism.strips
     assert (notch.kind, notch.at_mm) == ("elliptic", pytest.approx((20.0, 0.25)))
     assert (notch.thickness_mm, notch.half_length_mm, notch.depth_mm) == pytest.approx((0.5, 4.0, 2.0))
@@ -219,7 +213,7 @@ def test_a_notch_from_one_side_is_within_its_stated_errors(
 def test_a_neck_that_is_no_flexure_is_warned_of(
     tmp_path: Path, cut: str, place: tuple[float, float], thickness: float
 ) -> None:
-    mechanism = drawn(
+    mechanism = drawing(
         tmp_path, BEAM + TILTED.replace("19, 9", "13, 9").replace("21, 1", "15, 1") + f"[[body]]\ncut = true\n{cut}\n"
     )
     assert [flexure.name for flexure in mechanism.strips] == ["notch 1"]
@@ -229,7 +223,7 @@ def test_a_neck_that_is_no_flexure_is_warned_of(
 
 @pytest.mark.slow
 def test_the_command_says_which_notches_it_took_for_flexures(tmp_path: Path) -> None:
-    drawn(tmp_path, BEAM + ONE_SIDED)
+    drawing(tmp_path, BEAM + ONE_SIDED)
     asked = [str(tmp_path / "mechanism.toml"), "--kind", "lumped", "--out", str(tmp_path / "out")]
     said = CliRunner().invoke(command, asked, catch_exceptions=False)
     assert "notch 1 at (20, 0.25) mm, 0.5 mm thick and 8 mm long, is treated as a flexure" in said.output

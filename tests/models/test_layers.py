@@ -13,8 +13,8 @@ from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.rigid_bodies import RigidBodies
-from fingervision.storage.mechanism_toml import read_mechanism
 from fingervision.storage.outline_file import write_outline
+from tests.drawings import drawing
 
 HEAD = """
 plate_mm = 4.0
@@ -59,9 +59,7 @@ box_mm = [-2, 44, 0, 0]
 
 
 def drawn(folder: Path, text: str) -> Mechanism:
-    path = folder / "mechanism.toml"
-    path.write_text(HEAD + text)
-    return read_mechanism(path)
+    return drawing(folder, HEAD + text)
 
 
 def stage(number: int, x0: float) -> str:

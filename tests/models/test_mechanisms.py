@@ -12,6 +12,7 @@ from fingervision.models.flexure import Flexure
 from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.storage.mechanism_toml import read_mechanism
+from tests.drawings import drawing
 
 DRAWN = Path(__file__).parents[2] / "fingervision" / "models" / "mechanisms"
 ONE_PERCENT = 0.01
@@ -135,8 +136,7 @@ def test_butterfly_pivot(kind: Kind) -> None:
 
 def test_one_number_changes_the_drawing(tmp_path: Path) -> None:
     text = (DRAWN / "parallel_leaf_stage.toml").read_text()
-    (tmp_path / "m.toml").write_text(text.replace("leaf = 40.0", "leaf = 20.0"))
-    short = MechanismPlate(read_mechanism(tmp_path / "m.toml"), width_effect=False)
+    short = MechanismPlate(drawing(tmp_path, text.replace("leaf = 40.0", "leaf = 20.0"), "m"), width_effect=False)
     expected = 2.0 * leaf_stiffness(210e3, 0.5, 0.4, 20.0)[0, 0]
     assert short.stiffness_n_mm == pytest.approx(expected, rel=0.015)
 

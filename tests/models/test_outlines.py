@@ -12,7 +12,7 @@ from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import bodies_of
 from fingervision.models.planar_region import PlanarRegion, rounded_corner, sharp_corners_mm
 from fingervision.models.plane_shapes import Ellipse, Polygon, RigidMap, box, in_arcs
-from fingervision.storage.mechanism_toml import read_mechanism
+from tests.drawings import drawing
 
 HEAD = """
 plate_mm = 4.0
@@ -69,9 +69,7 @@ at_mm = [10, 23]
 
 
 def drawn(folder: Path, text: str) -> Mechanism:
-    path = folder / "mechanism.toml"
-    path.write_text(HEAD + text)
-    return read_mechanism(path)
+    return drawing(folder, HEAD + text)
 
 
 def area_mm2(region: PlanarRegion) -> float:
@@ -189,10 +187,8 @@ CHANGED = [
 def test_a_wrong_drawing_is_one_sentence_with_its_place(tmp_path: Path, old: str, new: str, said: list[str]) -> None:
     right = HALF + COPIED
     assert old in HEAD + right
-    path = tmp_path / "mechanism.toml"
-    path.write_text((HEAD + right).replace(old, new, 1) if old else HEAD + right + new)
     with pytest.raises(FingervisionError) as refused:
-        read_mechanism(path)
+        drawing(tmp_path, (HEAD + right).replace(old, new, 1) if old else HEAD + right + new)
     assert all(part in str(refused.value) for part in said)
     assert "\n" not in str(refused.value)
 

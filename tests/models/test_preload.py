@@ -15,7 +15,7 @@ from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import mechanism_figures, response_figures
 from fingervision.models.rigid_bodies import RigidBodies
-from fingervision.storage.mechanism_toml import read_mechanism
+from tests.drawings import drawing
 from tests.models.coarse import coarse_elements
 
 HEAD = """
@@ -102,9 +102,7 @@ elements = partial(coarse_elements, refine=0.3)
 
 
 def drawn(folder: Path, text: str) -> Mechanism:
-    path = folder / "mechanism.toml"
-    path.write_text(HEAD + text)
-    return read_mechanism(path)
+    return drawing(folder, HEAD + text)
 
 
 def column(folder: Path, preload_n: float) -> Mechanism:

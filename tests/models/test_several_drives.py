@@ -1,6 +1,5 @@
 """Several driven faces: superposition, rigid motions, reciprocity, and agreement of the three kinds of model."""
 
-import csv
 import json
 import re
 import tomllib
@@ -19,6 +18,7 @@ from fingervision.models.mechanism import Drive, Mechanism
 from fingervision.models.mechanism_figures import MechanismModel, mechanism_figures
 from fingervision.models.rigid_bodies import RigidBodies
 from fingervision.storage.mechanism_toml import mechanism_from_tables, read_mechanism
+from tests.csv_rows import csv_rows
 
 ROOT = Path(__file__).parents[2]
 STAGE = (ROOT / "fingervision" / "models" / "mechanisms" / "parallel_leaf_stage.toml").read_text()
@@ -109,8 +109,7 @@ def test_the_command_says_what_every_drive_does(tmp_path: Path) -> None:
         assert figures["input_stiffness_n_mm"] == pytest.approx(
             figures["lower: force per input [N/mm]"] - 0.5 * figures["upper: force per input [N/mm]"], rel=1e-5
         )
-    with (tmp_path / "mechanism.csv").open() as file:
-        last = list(csv.DictReader(file))[-1]
+    last = csv_rows(tmp_path / "mechanism.csv")[-1]
     whole = float(last["lower_force_n"]) - 0.5 * float(last["upper_force_n"])
     assert float(last["force_n"]) == pytest.approx(whole, rel=1e-5)
     assert (tmp_path / "models.png").read_bytes().startswith(b"\x89PNG")

@@ -12,7 +12,7 @@ from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import width_effect
 from fingervision.models.strips import necks_of, strips_of
-from fingervision.storage.mechanism_toml import read_mechanism
+from tests.drawings import drawing
 
 HEAD = """
 plate_mm = 4.0
@@ -52,9 +52,7 @@ half_length_mm = 6.0
 
 
 def drawn(folder: Path, bodies: str) -> Mechanism:
-    path = folder / "mechanism.toml"
-    path.write_text(HEAD + bodies)
-    return read_mechanism(path)
+    return drawing(folder, HEAD + bodies)
 
 
 def test_a_strip_between_two_slots_is_the_leaf_that_it_is(tmp_path: Path) -> None:
@@ -79,9 +77,7 @@ def test_the_stress_beside_sharp_roots_is_within_its_stated_error(
     CalculiX.
     """
     text = HEAD.replace("0.34", "0.35") + f'across = "free"\nturns = "{turns}"\n' + NAMED
-    path = tmp_path / "mechanism.toml"
-    path.write_text(text.replace("thickness_mm = 1.0", "thickness_mm = 0.4"))
-    mechanism = read_mechanism(path)
+    mechanism = drawing(tmp_path, text.replace("thickness_mm = 1.0", "thickness_mm = 0.4"))
     for kind in (MechanismPlate, MechanismFrame):
         model = kind(mechanism)
         assert model.stress_error < 0.08

@@ -9,7 +9,7 @@ import pytest
 from fingervision.domain.errors import DataError
 from fingervision.models.finite_element import MechanismPlate
 from fingervision.models.mechanism import Mechanism
-from fingervision.storage.mechanism_toml import read_mechanism
+from tests.drawings import drawing
 
 LEVER = """
 schema = 1
@@ -108,9 +108,7 @@ radius_mm = 0.0003
 
 def lever(tmp_path: Path, radius: float) -> Mechanism:
     """A lever on a neck of 0.6 mm between an arc of 3 mm and another."""
-    path = tmp_path / "lever.toml"
-    path.write_text(LEVER.format(left=0.3 + radius, radius=radius), encoding="utf-8")
-    return read_mechanism(path)
+    return drawing(tmp_path, LEVER.format(left=0.3 + radius, radius=radius), "lever")
 
 
 @pytest.mark.parametrize("radius", [3.0, 3.2, 5.0])
@@ -136,10 +134,8 @@ def test_without_lateral_contraction_nothing_is_held(tmp_path: Path) -> None:
 
 def test_a_drawing_in_metres_is_told_by_its_size(tmp_path: Path) -> None:
     """A lever that is drawn in metres, with an arc near a side, ended with an unknown error."""
-    path = tmp_path / "metres.toml"
-    path.write_text(IN_METRES, encoding="utf-8")
     with pytest.raises(DataError, match="metres"):
-        read_mechanism(path)
+        drawing(tmp_path, IN_METRES, "lever")
 
 
 def test_a_stress_that_is_largest_at_the_end_of_a_face_is_no_number(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """Cycles of target visits are recognised in the path of the stage, and continuous motions are not taken for cycles."""
 
-import csv
 import re
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from hypothesis import strategies as st
 
 from fingervision.diagnosis.report.positioning_accuracy import positioning_accuracy
 from fingervision.motion.repeated_targets import NoRepeatedTargets, RepeatedTargets, repeated_targets
+from tests.csv_rows import csv_rows
 
 RIGS = Path(__file__).parents[3] / "shared" / "real" / "rigs"
 PLACES = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
@@ -192,8 +192,7 @@ def test_a_triangle_recorded_by_an_encoder_is_no_cycle(seed: int) -> None:
     ],
 )
 def test_measured_tables_of_real_rigs(name: str, cycle_counts: tuple[int, int] | None) -> None:
-    with (RIGS / name / "measured.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(RIGS / name / "measured.csv")
     names = [row.get("run", "") for row in rows]
     runs = tuple(slice(names.index(n), names.index(n) + names.count(n)) for n in dict.fromkeys(names))
     inputs = np.array([float(row["input_mm"]) for row in rows])

@@ -1,6 +1,5 @@
 """The sample frames agree with their notes, and their scripts reproduce them."""
 
-import csv
 import subprocess
 import sys
 from itertools import pairwise
@@ -10,6 +9,8 @@ import av
 import cv2
 import numpy as np
 import pytest
+
+from tests.csv_rows import csv_rows
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "sample_frames"
@@ -21,8 +22,7 @@ pytestmark = pytest.mark.skipif(not SAMPLES.is_dir(), reason="sample_frames is n
 
 
 def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as source:
-        return list(csv.DictReader(source))
+    return csv_rows(path)
 
 
 def column(path: Path, name: str) -> np.ndarray:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from fingervision.domain.errors import DataError, FingervisionError, OutputError
 from fingervision.domain.status import Status
 from fingervision.storage.gaps_csv import COLUMNS, MM_PLACES, GapRow, GapsCsv, GapsReader
+from tests.csv_rows import csv_rows
 
 HEADER = (
     "frame,time_s,status,gap_mm,u_gap_mm,u_random_mm,gap_px,u_gap_px,left_x_px,left_y_px,right_x_px,right_y_px,"
@@ -47,8 +48,7 @@ def test_values_survive_the_file(
     path = tmp_path_factory.mktemp("table") / "gaps.csv"
     with GapsCsv(path, ("run", "input_mm")) as table:
         table.add([GapRow(3, time_s, Status.OK, gap_mm=gap_mm, run=run)])
-    with path.open(newline="", encoding="utf-8") as file:
-        (row,) = csv.DictReader(file)
+    (row,) = csv_rows(path)
     assert float(row["gap_mm"]) == pytest.approx(gap_mm, abs=MM_TOLERANCE)
     assert float(row["time_s"]) == pytest.approx(time_s, abs=1e-9)
     assert row["run"] == run

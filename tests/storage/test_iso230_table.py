@@ -1,6 +1,5 @@
 """Tables of targets, cycles and directions become measured tables; bad ones end in a sentence."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from fingervision.tables.formats import read_raw
 from fingervision.tables.iso230 import Iso230Rows, iso230_rows_of
 from fingervision.tables.mapping import Entry
 from fingervision.tables.read import read_measured_table
+from tests.csv_rows import csv_rows
 
 TARGETS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 CYCLES = 3
@@ -241,8 +241,7 @@ RIG = Path(__file__).parents[3] / "shared" / "real" / "rigs" / "ess_x_map_path" 
 
 @pytest.mark.skipif(not RIG.exists(), reason="the measured tables of real rigs are not here (../shared/real/rigs)")
 def test_a_published_table_comes_back_in_its_order_of_travel(tmp_path: Path) -> None:
-    with RIG.open() as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(RIG)
     readings = [(float(row["input_mm"]), float(row["gap_mm"]) - 23.0) for row in rows if row["gap_mm"]]
     lines = [f"{t},{k // 18 + 1},{'up' if k % 18 < 9 else 'down'},{p!r}" for k, (t, p) in enumerate(readings)]
     order = np.random.default_rng(2).permutation(len(lines))

@@ -16,8 +16,8 @@ from fingervision.models.gripper_mechanism import whole_mechanism
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.planar_region import PlanarRegion
 from fingervision.storage.gripper_toml import read_gripper
-from fingervision.storage.mechanism_toml import read_mechanism
 from fingervision.storage.outline_file import read_outline, write_outline
+from tests.drawings import drawing
 
 ezdxf = pytest.importorskip("ezdxf")
 pytest.importorskip("svgelements")
@@ -51,9 +51,7 @@ PARTS = [(0, 0), (15, 0), (15, 4.5), (25, 4.5), (25, 0), (40, 0), (40, 10), (25,
 
 
 def drawn(folder: Path, bodies: str) -> Mechanism:
-    path = folder / "mechanism.toml"
-    path.write_text(REST + bodies)
-    return read_mechanism(path)
+    return drawing(folder, REST + bodies)
 
 
 def area_mm2(region: PlanarRegion) -> float:

@@ -2,7 +2,6 @@
 repeatable.
 """
 
-import csv
 import json
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from fingervision.storage.drive_csv import read_samples
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.testbed.simulation.injected_effects import Hidden
+from tests.csv_rows import csv_rows
 from tests.testbed.simulated_beds import recipe_at, run, steps
 
 # Frames of 640 columns with noise of 2 grey levels: 0.014 px of each gap, 0.4 um. The tolerance is five times that, and
@@ -88,8 +88,7 @@ def assert_table_is_that_of_its_video(folder: Path, out: Path) -> None:
     rows = read_samples(folder / "samples.csv")
     command = ["measure", str(folder / "video.mp4"), "--px-per-mm", "34", "--below-tip-mm", "0.3", "--out", str(out)]
     assert CliRunner().invoke(cli, command).exit_code == 0
-    with (out / "gaps.csv").open(encoding="utf-8") as file:
-        measured = list(csv.DictReader(file))
+    measured = csv_rows(out / "gaps.csv")
     assert len(measured) == len(rows) > 50
     for row, again in zip(rows, measured, strict=True):
         assert row.status == again["status"]

@@ -1,6 +1,5 @@
 """The published experiment as a recipe: the inputs of Table 1, and the gaps that the test bed measures there."""
 
-import csv
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +8,7 @@ import numpy as np
 import pytest
 
 from fingervision.storage.recipe_toml import read_recipe
+from tests.csv_rows import csv_rows
 
 SAMPLES = Path(__file__).parents[2] / "sample_frames"
 # Tolerance of the gap measured in five frames at 34 px/mm, including the position of the stage: 0.1 px.
@@ -18,8 +18,7 @@ pytestmark = pytest.mark.skipif(not SAMPLES.is_dir(), reason="sample_frames is n
 
 
 def table(path: Path) -> dict[str, np.ndarray]:
-    with path.open(encoding="utf-8", newline="") as source:
-        rows = list(csv.DictReader(source))
+    rows = csv_rows(path)
     return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
 
 

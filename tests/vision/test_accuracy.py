@@ -5,7 +5,6 @@ that scatter: chi-square for an RMS, normal for a mean, binomial for a share. A 
 99.9 %. `tests/benchmarks/accuracy.py` runs the long versions against the bars themselves.
 """
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.video_file import VideoFile
 from fingervision.rendering import Camera, Light, SquareTip, TrueGap, dust, render, truth, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
+from tests.csv_rows import csv_rows
 
 TOP = Path(__file__).resolve().parents[2]
 DROPS = TOP.parent / "shared" / "real" / "drops"
@@ -122,8 +122,7 @@ def test_ninety_percent_of_every_class_lie_within_two(errors: dict[str, Errors],
 
 def test_the_frames_of_table_1_give_back_the_experiment() -> None:
     folder = TOP / "sample_frames" / "table1"
-    with (folder / "expected_gaps.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(folder / "expected_gaps.csv")
     away = []
     for row in rows:
         pixels = cv2.imread(str(folder / row["file"]), cv2.IMREAD_UNCHANGED)
@@ -139,8 +138,7 @@ def test_the_frames_of_table_1_give_back_the_experiment() -> None:
 @pytest.mark.parametrize(("name", "limit_px"), [("drops.mkv", 0.010), ("drops.mp4", 0.020)])
 @pytest.mark.parametrize("direction", [Direction.DOWN, None], ids=["down", "auto"])
 def test_real_drops_follow_their_truth(name: str, limit_px: float, direction: Direction | None) -> None:
-    with (DROPS / "truth.csv").open(encoding="utf-8") as file:
-        true = np.array([float(row["separation_change_px"]) for row in csv.DictReader(file)])
+    true = np.array([float(row["separation_change_px"]) for row in csv_rows(DROPS / "truth.csv")])
     apart = []
     for frame in VideoFile(DROPS / name):
         assert isinstance(frame, Frame)
