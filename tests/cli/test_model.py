@@ -1,18 +1,18 @@
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from fingervision.cli.model import command
 from fingervision.domain.errors import FingervisionError, InputFileError, OutputError, UsageError
 from fingervision.models.answer_figures import Physics
 from fingervision.models.grip import Part, first_grip_mm
 from fingervision.models.kinds import build_model, kinds
 from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
+from tests.commands import printed
 from tests.csv_rows import csv_rows
 
 NOTCH = 0.02
@@ -27,10 +27,7 @@ def drive(path: Path, inputs: list[float]) -> Path:
     return path
 
 
-def run(*arguments: str | Path) -> str:
-    result = CliRunner().invoke(command, [str(part) for part in arguments], catch_exceptions=False)
-    assert result.exit_code == 0
-    return result.output
+run = partial(printed, "model")
 
 
 def test_beam_theory_alone_is_refused_where_it_would_change_nothing(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """`fingervision model` in motion: --drive, --frequency, --modes, and what they refuse."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import av
@@ -10,7 +11,6 @@ from click.testing import CliRunner
 
 from fingervision.cli._model_motion import for_picture
 from fingervision.cli.compare import command as compare
-from fingervision.cli.model import command
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import DataError, FingervisionError, ModelError, UsageError
@@ -18,6 +18,7 @@ from fingervision.models.lumped import LumpedGripper
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
+from tests.commands import printed
 from tests.csv_rows import csv_rows
 
 ROOT = Path(__file__).parents[2]
@@ -25,10 +26,7 @@ GRIPPER = ROOT / "sample_frames" / "paper" / "gripper.toml"
 FOUR_BAR = ROOT / "fingervision" / "models" / "mechanisms" / "four_bar_gripper.toml"
 
 
-def run(*arguments: str | Path) -> str:
-    result = CliRunner().invoke(command, [str(part) for part in arguments], catch_exceptions=False)
-    assert result.exit_code == 0
-    return result.output
+run = partial(printed, "model")
 
 
 def table(path: Path) -> np.ndarray:

@@ -4,9 +4,8 @@ import json
 from pathlib import Path
 
 import numpy as np
-from click.testing import CliRunner
 
-from fingervision.cli import cli
+from tests.commands import printed
 
 
 def test_targets_in_figures_out_with_an_effect_on_request(tmp_path: Path) -> None:
@@ -19,9 +18,8 @@ def test_targets_in_figures_out_with_an_effect_on_request(tmp_path: Path) -> Non
     measured.write_text("\n".join(lines) + "\n")
     model.write_text("input_mm,gap_mm\n-3,-3\n3,3\n")
     words = ["--model", str(model), "--out", str(out), "--with", "input_offset"]
-    done = CliRunner().invoke(cli, ["diagnose", str(measured), *words])
-    assert done.exit_code == 0, done.output
-    assert "Read as an ISO 230-2 table: 7 targets, 5 cycles" in done.output
+    said = printed("diagnose", str(measured), *words)
+    assert "Read as an ISO 230-2 table: 7 targets, 5 cycles" in said
     report = json.loads((out / "report.json").read_text())
     assert "input_offset" in [effect["name"] for effect in report["effects"]]
     section = report["iso230"]

@@ -11,6 +11,7 @@ import fingervision as fv
 from fingervision.cli import cli
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
 from fingervision.interface.prediction import figures_text
+from tests.commands import printed
 
 PAPER = Path(__file__).parents[2] / "sample_frames/paper_run"
 MEASURED, MODEL = PAPER / "measured.csv", PAPER / "gripper.csv"
@@ -23,12 +24,6 @@ def table(offset_mm: float = 0.0, **more: object) -> dict[str, object]:
     return {"input_mm": inputs, "gap_mm": 1.0 + offset_mm + 2.0 * inputs + noise, **more}
 
 
-def command(*arguments: object) -> str:
-    ended = CliRunner().invoke(cli, [str(each) for each in arguments], catch_exceptions=False)
-    assert ended.exit_code == 0, ended.output
-    return ended.output
-
-
 def without_call(path: Path) -> dict[str, object]:
     document = json.loads(path.read_text())
     for key in ("command", "made_at"):
@@ -38,7 +33,7 @@ def without_call(path: Path) -> dict[str, object]:
 
 
 def test_compare_saves_what_the_command_writes(tmp_path: Path) -> None:
-    said = command("compare", MEASURED, "--model", MODEL, "--out", tmp_path / "command")
+    said = printed("compare", MEASURED, "--model", MODEL, "--out", tmp_path / "command")
     found = fv.compare(MEASURED, MODEL)
     found.save(tmp_path / "function")
     assert said.startswith(found.report())
@@ -52,7 +47,7 @@ def test_compare_saves_what_the_command_writes(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_diagnose_saves_what_the_command_writes(tmp_path: Path) -> None:
-    said = command("diagnose", MEASURED, "--model", MODEL, "--out", tmp_path / "command")
+    said = printed("diagnose", MEASURED, "--model", MODEL, "--out", tmp_path / "command")
     found = fv.diagnose(MEASURED, MODEL)
     found.save(tmp_path / "function")
     assert said.startswith(found.sentences())
@@ -145,7 +140,7 @@ def test_simulate_takes_any_drive(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_gripper_answers_as_the_model_command(tmp_path: Path) -> None:
     gripper = PAPER.parent / "paper/gripper.toml"
-    command("model", gripper, "--kind", "lumped", "--out", tmp_path / "model")
+    printed("model", gripper, "--kind", "lumped", "--out", tmp_path / "model")
     simulated = fv.read_table(tmp_path / "model/simulation.csv", "simulation")
     inside = simulated.input_mm[(simulated.input_mm > -0.05) & (simulated.input_mm < 0.2)]
     answer = fv.simulate(gripper, inside, kind="lumped")

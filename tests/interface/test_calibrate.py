@@ -1,27 +1,24 @@
 """`fingervision.calibrate` and `Calibration`: the command's file, from files and arrays; a check; refusals by name."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import fingervision as fv
-from fingervision.cli import cli
 from fingervision.domain.errors import ArgumentError
 from fingervision.interface.examples import board_pictures, micrometer
+from tests.commands import printed
 
 FOLDER = Path(__file__).parents[2] / "sample_frames/reference"
 SIZES = {"bar_05mm.png": 5.0, "bar_11mm.png": 11.0, "bar_17mm.png": 17.0}
 TRUE_PX_PER_MM = 34.0
 
 
-def command(*arguments: object) -> str:
-    ended = CliRunner().invoke(cli, ["calibrate", *map(str, arguments)], catch_exceptions=False)
-    assert ended.exit_code == 0, ended.output
-    return ended.output
+command = partial(printed, "calibrate")
 
 
 def content(path: Path) -> dict[str, object]:

@@ -1,16 +1,16 @@
 """`fingervision.measure`: the command's numbers, from any picture; what cannot be meant is refused by name."""
 
+from functools import partial
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import fingervision as fv
-from fingervision.cli import cli
 from fingervision.domain.errors import ArgumentError, ArgumentTypeError, UnknownNameError
 from fingervision.rendering import Camera, render, two_fingers
+from tests.commands import printed
 from tests.csv_rows import csv_rows
 
 SAMPLES = Path(__file__).parents[2] / "sample_frames"
@@ -24,10 +24,7 @@ def picture(noise_grey: float = 2.0) -> np.ndarray:
     return render(scene, Camera(blur_px=0.9, noise_grey=noise_grey), np.random.default_rng(3))
 
 
-def command(*arguments: str) -> str:
-    ended = CliRunner().invoke(cli, ["measure", *arguments], catch_exceptions=False)
-    assert ended.exit_code == 0, ended.output
-    return ended.output
+command = partial(printed, "measure")
 
 
 def test_saves_the_commands_bytes(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from fingervision.domain.errors import ExitCode, FingervisionError
 from fingervision.live.server import Page
 from fingervision.live.session import Session
 from fingervision.storage.calibration_json import write_calibration
+from tests.commands import printed
 
 
 def refused(*arguments: str | Path) -> FingervisionError:
@@ -112,9 +113,8 @@ def test_a_calibration_of_another_frame_size_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_list_says_where_to_begin_without_a_camera() -> None:
-    result = CliRunner().invoke(cli, ["live", "--list"])
-    assert result.exit_code == 0
-    assert "/dev/video" in result.output or "`simulated`" in result.output
+    listed = printed("live", "--list")
+    assert "/dev/video" in listed or "`simulated`" in listed
 
 
 @pytest.mark.parametrize(("host", "is_warned"), [("127.0.0.1", False), ("0.0.0.0", True)])

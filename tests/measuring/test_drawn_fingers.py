@@ -5,12 +5,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from fingervision.cli import cli
 from fingervision.models.mechanism_bodies import bodies_of
 from fingervision.storage.mechanism_toml import read_drawing
 from tests.benchmarks.films_of_mechanisms import DRAWINGS, View
+from tests.commands import printed
 from tests.csv_rows import csv_rows
 
 DRAWING = DRAWINGS / "leaf_tweezers.toml"
@@ -45,8 +44,7 @@ def filmed(folder: Path, angle_deg: float) -> Path:
 def test_a_film_of_a_whole_mechanism_gives_its_gap_and_pairs_in_every_frame(tmp_path: Path, angle_deg: float) -> None:
     film = filmed(tmp_path / "film", angle_deg)
     given = ["measure", str(film), "--rate-hz", "25", "--px-per-mm", str(PX_PER_MM), "--mechanism", str(DRAWING)]
-    done = CliRunner().invoke(cli, [*given, "--out", str(tmp_path / "out")])
-    assert done.exit_code == 0, done.output
+    printed(*given, "--out", str(tmp_path / "out"))
     gaps = csv_rows(tmp_path / "out" / "gaps.csv")
     pairs = csv_rows(tmp_path / "out" / "gauges.csv")
     assert [row["status"] for row in gaps] == ["ok"] * len(CLOSED_MM)

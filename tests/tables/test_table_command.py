@@ -9,25 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from fingervision.cli import cli
-from fingervision.domain.errors import DataError, ExitCode, NoCalibrationError, UsageError
+from fingervision.domain.errors import DataError, NoCalibrationError, UsageError
 from fingervision.tables.mapping import entry_for
 from fingervision.tables.questions import OpenQuestionError
 from fingervision.tables.read import read_drive, read_measured_table, read_model
+from tests.commands import printed
 
 HERE = Path(__file__).parents[2]
 FOREIGN = HERE / "tests" / "storage" / "foreign"
 TABLE1 = HERE / "sample_frames" / "paper" / "table1.csv"
-
-
-def call(*words: object) -> str:
-    done = CliRunner().invoke(cli, [str(word) for word in words])
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    assert done.exit_code == ExitCode.DONE
-    return done.output
 
 
 def copied(name: str, folder: Path) -> Path:
@@ -36,7 +27,7 @@ def copied(name: str, folder: Path) -> Path:
 
 def test_what_was_understood_is_printed_and_written(tmp_path: Path) -> None:
     table = copied("german_logger.csv", tmp_path)
-    said = call("table", table)
+    said = printed("table", table)
     for words in ("cp1252", "semicolon", "decimal comma", "Weg [µm]", "input_mm", "24 rows", "10 rows a second"):
         assert words in said
     text = (tmp_path / "columns.toml").read_text(encoding="utf-8")
@@ -44,7 +35,7 @@ def test_what_was_understood_is_printed_and_written(tmp_path: Path) -> None:
     assert 'columns.input = "Weg [µm]"' in text
     again = read_measured_table(table)
     assert any("columns.toml" in note for note in again.notes)
-    assert "Unchanged" in call("table", table)
+    assert "Unchanged" in printed("table", table)
     assert (tmp_path / "columns.toml").read_text(encoding="utf-8") == text
 
 
@@ -52,27 +43,27 @@ def test_a_range_is_printed_with_its_own_unit_beside_that_of_the_file(tmp_path: 
     (tmp_path / "log.csv").write_text(
         "Zeit [ms];Weg [µm];Abstand [mm]\n0;0;1,2\n100;10;1,3\n200;30;1,4\n", encoding="utf-8"
     )
-    said = call("table", tmp_path / "log.csv")
+    said = printed("table", tmp_path / "log.csv")
     assert re.search(r"Weg \[µm\] +µm +input_mm +0 to 0\.03 mm\n", said)
     assert re.search(r"Zeit \[ms\] +ms +time_s +0 to 0\.2 s\n", said)
 
 
 def test_json_holds_what_is_printed(tmp_path: Path) -> None:
-    document = json.loads(call("table", copied("german_logger.csv", tmp_path), "--json"))
+    document = json.loads(printed("table", copied("german_logger.csv", tmp_path), "--json"))
     assert document["kind"] == "measured"
     assert document["rate_hz"] == pytest.approx(10.0)
     assert {each["role"]: each["unit"] for each in document["columns"]} == {"time": "ms", "input": "µm", "gap": "mm"}
     assert document["open"] == []
     with pytest.raises(OpenQuestionError):
-        call("table", copied("several_models.csv", tmp_path), "--json")
+        printed("table", copied("several_models.csv", tmp_path), "--json")
 
 
 def test_a_key_that_is_said_once_is_used_by_the_next_call_and_nothing_is_written_before(tmp_path: Path) -> None:
     table = copied("several_models.csv", tmp_path)
     with pytest.raises(OpenQuestionError, match=r"simmechanics_mm.*comsol_mm.*--set columns.gap="):
-        call("table", table)
+        printed("table", table)
     assert not (tmp_path / "columns.toml").exists()
-    call("table", table, "--set", "columns.gap=comsol_mm")
+    printed("table", table, "--set", "columns.gap=comsol_mm")
     assert read_model(table).base_path == str(table)
     # The same table as a measurement is another question.
     with pytest.raises(OpenQuestionError):
@@ -84,25 +75,25 @@ def test_a_gap_over_the_input_without_times_is_said_once_for_a_measurement_and_f
     rows = "".join(f"{0.1 * k:.1f} {4.2 + 0.77 * k:.2f}\n" for k in range(8))
     table.write_text("% Eingriff (mm)   Gap (mm)\n" + rows, encoding="utf-8")
     with pytest.raises(OpenQuestionError) as caught:
-        call("table", table)
+        printed("table", table)
     assert "--kind" not in str(caught.value)
-    printed = call("table", table, "--set", caught.value.questions[0].key)
-    assert "measured or simulation table" in printed
-    assert json.loads(call("table", table, "--json"))["also"] == "simulation"
+    said = printed("table", table, "--set", caught.value.questions[0].key)
+    assert "measured or simulation table" in said
+    assert json.loads(printed("table", table, "--json"))["also"] == "simulation"
     np.testing.assert_allclose(read_measured_table(table).gap_mm, 4.2 + 0.77 * np.arange(8))
     np.testing.assert_allclose(read_model(table).base.respond(np.array([0.35])).gap_mm, 6.895)
 
 
 def test_times_make_a_measured_table_of_it(tmp_path: Path) -> None:
     table = copied("inches.csv", tmp_path)
-    assert json.loads(call("table", table, "--json"))["also"] == ""
+    assert json.loads(printed("table", table, "--json"))["also"] == ""
     assert 'as = "measured"' in (tmp_path / "columns.toml").read_text(encoding="utf-8")
 
 
 def test_two_open_questions_suggest_two_columns(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("alpha,beta,gamma\n0,1,2\n1,2,3\n2,4,5\n", encoding="utf-8")
     with pytest.raises(OpenQuestionError, match=r"columns\.input=beta --set columns\.gap=gamma"):
-        call("table", tmp_path / "log.csv", "--as", "measured")
+        printed("table", tmp_path / "log.csv", "--as", "measured")
 
 
 def test_the_papers_table_is_read_as_it_is(tmp_path: Path) -> None:
@@ -113,9 +104,9 @@ def test_the_papers_table_is_read_as_it_is(tmp_path: Path) -> None:
     np.testing.assert_allclose(measured.input_mm, 1e3 * rows[:, 0], atol=1e-12)
     np.testing.assert_allclose(measured.gap_mm, rows[:, 3], atol=1e-12)
     columns = tmp_path / "decided.toml"
-    call("table", table, "--as", "simulation", "--set", "columns.gap=comsol_mm", "--out", columns)
+    printed("table", table, "--as", "simulation", "--set", "columns.gap=comsol_mm", "--out", columns)
     out = tmp_path / "out"
-    call("compare", table, "--model", table, "--columns", columns, "--out", out)
+    printed("compare", table, "--model", table, "--columns", columns, "--out", out)
     found = json.loads((out / "compare.json").read_text())["rms_mm"]
     difference = rows[:, 3] - rows[:, 2]
     assert found == pytest.approx(np.sqrt(np.mean(difference**2)), rel=0.15)
@@ -125,9 +116,9 @@ def test_entries_of_other_tables_and_comments_stay(tmp_path: Path) -> None:
     path = tmp_path / "columns.toml"
     mine = '# our bench\nschema = 1\n\n[[table]]\nfile = "other*.csv"  # all of Monday\nunits.input = "um"\n'
     path.write_text(mine, encoding="utf-8")
-    call("table", copied("german_logger.csv", tmp_path))
-    call("table", copied("labview_one_x.lvm", tmp_path))
-    call("table", tmp_path / "german_logger.csv", "--set", "units.gap=mm")
+    printed("table", copied("german_logger.csv", tmp_path))
+    printed("table", copied("labview_one_x.lvm", tmp_path))
+    printed("table", tmp_path / "german_logger.csv", "--set", "units.gap=mm")
     text = path.read_text(encoding="utf-8")
     assert text.startswith(mine)
     assert text.count("[[table]]") == 3
@@ -137,7 +128,7 @@ def test_entries_of_other_tables_and_comments_stay(tmp_path: Path) -> None:
 def test_own_tables_are_read_to_the_letter_and_need_no_mapping(tmp_path: Path) -> None:
     table = tmp_path / "drive.csv"
     table.write_text("time_s,input_mm\n0,1\n1,1\n")
-    assert "own format" in call("table", table, "--as", "drive")
+    assert "own format" in printed("table", table, "--as", "drive")
     assert not (tmp_path / "columns.toml").exists()
     assert read_drive(table).input_mm.tolist() == [1.0, 1.0]
     table.write_text("time_s,input_mm\n0,nan\n")
@@ -170,12 +161,12 @@ def test_an_input_that_is_missing_for_most_of_the_gaps_is_asked_about(tmp_path: 
     table.write_text("time [s],position [mm],gap [mm]\n" + "\n".join(rows) + "\n")
     with pytest.raises(OpenQuestionError, match="only 9 of 24 rows"):
         read_measured_table(table)
-    call("table", table, "--set", "accept=overlap")
+    printed("table", table, "--set", "accept=overlap")
     assert read_measured_table(table).gap_mm.size == 9
 
 
 def test_a_picture_is_drawn(tmp_path: Path) -> None:
-    call("table", copied("labview_one_x.lvm", tmp_path), "--png", tmp_path / "t.png")
+    printed("table", copied("labview_one_x.lvm", tmp_path), "--png", tmp_path / "t.png")
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -190,29 +181,29 @@ def test_results_of_another_table_are_never_replaced(tmp_path: Path, monkeypatch
     monkeypatch.chdir(tmp_path)
     first, second = copied("german_logger.csv", tmp_path), copied("spanish.csv", tmp_path)
     model = simulation(tmp_path)
-    call("compare", first, "--model", model)
+    printed("compare", first, "--model", model)
     before = Path("comparison/compare.json").read_bytes()
-    said = call("compare", second, "--model", model)
+    said = printed("compare", second, "--model", model)
     assert "comparison-spanish" in said
     assert Path("comparison/compare.json").read_bytes() == before
     assert Path("comparison-spanish/compare.json").exists()
     with pytest.raises(UsageError, match="holds the results of"):
-        call("compare", second, "--model", model, "--out", "comparison")
+        printed("compare", second, "--model", model, "--out", "comparison")
     assert Path("comparison/compare.json").read_bytes() == before
-    call("compare", second, "--model", model)
-    call("compare", first, "--model", model)
+    printed("compare", second, "--model", model)
+    printed("compare", first, "--model", model)
     assert sorted(path.name for path in tmp_path.glob("comparison*")) == ["comparison", "comparison-spanish"]
 
 
 def test_a_model_leaves_no_part_of_an_earlier_answer(tmp_path: Path) -> None:
     gripper, out = HERE / "sample_frames" / "paper" / "gripper.toml", tmp_path / "out"
-    call("model", gripper, "--kind", "stiffness_matrix", "--out", out)
+    printed("model", gripper, "--kind", "stiffness_matrix", "--out", out)
     for name in ("deformed.png", "notes.txt", "lumped"):
         (out / name).mkdir() if name == "lumped" else (out / name).write_text("old")
     (out / "lumped" / "simulation.csv").write_text("old")
     for stale in (out / "deformed.png", out / "lumped" / "simulation.csv"):
         os.utime(stale, ns=(time.time_ns() - 10**10,) * 2)
-    call("model", gripper, "--kind", "stiffness_matrix", "--out", out)
+    printed("model", gripper, "--kind", "stiffness_matrix", "--out", out)
     assert not (out / "deformed.png").exists()
     assert not (out / "lumped" / "simulation.csv").exists()
     assert (out / "notes.txt").exists()
@@ -228,7 +219,7 @@ def gaps(folder: Path, name: str, values: np.ndarray) -> Path:
 def test_a_moving_run_has_no_repeatability(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     held = [gaps(tmp_path, f"held{k}.csv", 4.0 + 0.0003 * rng.standard_normal(60)) for k in (1, 2)]
-    assert "repeatability" in call("calibrate", "repeat", *held, "--tolerance-mm", "0.02")
+    assert "repeatability" in printed("calibrate", "repeat", *held, "--tolerance-mm", "0.02")
     moving = gaps(tmp_path, "moving.csv", 4.0 + 8.0 * np.sin(np.arange(60) / 9.0) + 0.0003 * rng.standard_normal(60))
     with pytest.raises(NoCalibrationError, match=r"moving\.csv.*range from"):
-        call("calibrate", "repeat", held[0], moving, "--tolerance-mm", "0.02")
+        printed("calibrate", "repeat", held[0], moving, "--tolerance-mm", "0.02")

@@ -15,6 +15,7 @@ from fingervision.storage.drive_csv import read_samples
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.testbed.simulation.injected_effects import Hidden
+from tests.commands import printed
 from tests.csv_rows import csv_rows
 from tests.testbed.simulated_beds import recipe_at, run, steps
 
@@ -163,9 +164,8 @@ def test_a_run_that_follows_another_goes_on_on_its_clock(tmp_path: Path) -> None
     first, second = tmp_path / "first", tmp_path / "second"
     drift = ["--hide", "camera_drift:rate_mm_per_s=0.05"]
     for out, more in ((first, []), (second, ["--after", str(first)])):
-        done = CliRunner().invoke(cli, ["bed", "run", str(recipe), *drift, "--out", str(out), *more])
-        assert done.exception is None, done.output
-    assert "joined.csv --model" in done.output
+        done = printed("bed", "run", str(recipe), *drift, "--out", str(out), *more)
+    assert "joined.csv --model" in done
     table = read_measured_table(second / "joined.csv")
     assert table.run_names == ("1", "2")
     assert table.shared_clock

@@ -5,15 +5,14 @@ tests/benchmarks/closed_loop.py.
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from fingervision.cli import cli
 from fingervision.demonstration.demonstrate import demonstrated, drawn
 from fingervision.diagnosis.diagnose import diagnose
 from fingervision.domain.report import DiagnosisReport, Verdict
 from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from fingervision.testbed.simulation.injected_effects import Hidden
+from tests.commands import printed
 from tests.testbed.simulated_beds import run, steps
 
 # One run to the end of the range and back, and one at another speed after a new reference: 400 frames.
@@ -51,10 +50,9 @@ def test_where_nothing_is_hidden_it_agrees(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_demonstration_finds_what_it_hid_and_says_each_step(tmp_path: Path) -> None:
-    done = CliRunner().invoke(cli, ["demo", "--hide", "backlash:play_mm=0.12", "--out", str(tmp_path / "demo")])
-    assert done.exception is None, done.output
-    lines = done.output.splitlines()
-    assert "named: The model lacks backlash (full width of the play 0.1" in done.output
+    said = printed("demo", "--hide", "backlash:play_mm=0.12", "--out", str(tmp_path / "demo"))
+    lines = said.splitlines()
+    assert "named: The model lacks backlash (full width of the play 0.1" in said
     assert "Hidden effect: backlash (play_mm = 0.12). It was found after one run." in lines
     page = Path(lines[-1].removeprefix("Report: "))
     assert "backlash" in page.read_text(encoding="utf-8")

@@ -14,6 +14,7 @@ from fingervision.storage.recipe_toml import read_recipe
 from fingervision.testbed.motion.move_limits import SoftLimits
 from fingervision.testbed.run.plan import plan
 from fingervision.testbed.run.recipe_check import planned_bed
+from tests.commands import printed
 from tests.testbed.board_bed import CONTRACT_STEPS, written_bed
 
 HEAD = 'schema = 1\nname = "test"\nbelow_force_n = 2.9\n'
@@ -34,8 +35,7 @@ def test_a_run_takes_the_time_and_the_way_of_its_plan(tmp_path: Path) -> None:
     steps = TRIANGLE.format(to_mm=1.0, speed=0.5) + '[[step]]\nkind = "hold"\nat_mm = 0.4\nseconds = 2.0\n'
     planned = json.loads(check(tmp_path, steps, "--json").stdout)
     out = str(tmp_path / "run")
-    done = CliRunner().invoke(cli, ["bed", "run", str(tmp_path / "recipe.toml"), "--out", out])
-    assert done.exit_code == 0, done.output
+    printed("bed", "run", str(tmp_path / "recipe.toml"), "--out", out)
     rows = read_samples(tmp_path / "run" / "samples.csv")
     assert rows[-1].time_s - rows[0].time_s == pytest.approx(planned["seconds"], rel=BESIDE_THE_PLAN)
     inputs = [row.input_mm for row in rows if row.input_mm is not None]
