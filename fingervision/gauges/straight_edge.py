@@ -174,14 +174,16 @@ def fit_near(
     corner = (int(x - half) - 1, int(y - half) - 1)
     side = 2 * int(half) + 4
     levels, origin = picture.part(*corner, side, side)
-    if not _is_in_view(picture, follower, min(places) - reach + 2.0, max(places) + reach - 2.0):
-        return NotFound(GaugeStatus.OUT_OF_VIEW)
-    if levels.size == 0:
+    is_in_view = _is_in_view(picture, follower, min(places) - reach + 2.0, max(places) + reach - 2.0)
+    if not is_in_view or levels.size == 0:
         return NotFound(GaugeStatus.OUT_OF_VIEW)
     try:
         cut_off = _cut_plateau(picture, levels)
         fitted = fit_straight_edges(levels, origin, band, starts, blur, picture.edge_shared_pixels, cut_off)
-    except (NoEdgeFitError, np.linalg.LinAlgError) as why:
+    except NoEdgeFitError as why:
+        if beside:
+            # In sloping light, a candidate beside the edge may be no edge, and does not determine a position.
+            return fit_near(follower, picture, chosen, chosen)
         return NotFound(GaugeStatus.NO_EDGE, str(why))
     found = []
     for k, step in enumerate(chosen):

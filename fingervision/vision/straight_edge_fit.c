@@ -1,17 +1,18 @@
 /* after linear_solve */
 /* after normal_distribution */
 /* The design matrix is stored pixel by pixel, with these columns: level; slope of the level along the edges; for each edge,
-   its step, and its step times the distance along; derivatives by its position and by its slope; derivative by the blur. */
+   its step, and its step times the distance along; derivatives by its position and by its slope; derivative by the blur; to
+   find slopes of the light, also the distance across, and this distance times the light. */
 
-enum { STRAIGHT_MOST_EDGES = MOST_EDGES, STRAIGHT_MOST_COLUMNS = 3 + 4 * STRAIGHT_MOST_EDGES, STRAIGHT_WANTED = 2 * STRAIGHT_MOST_EDGES };
+enum { STRAIGHT_MOST_EDGES = MOST_EDGES, STRAIGHT_MOST_COLUMNS = 5 + 4 * STRAIGHT_MOST_EDGES, STRAIGHT_WANTED = 2 * STRAIGHT_MOST_EDGES };
 /* Reasons why no fit was possible, in the order of the sentences in WHY_NOT. */
 enum { STRAIGHT_FITTED, STRAIGHT_TOO_FEW, STRAIGHT_NO_CONTRAST, STRAIGHT_NOT_SETTLED, STRAIGHT_UNDETERMINED };
 
 typedef struct {
     const double *levels;
     int64_t height, width, pixels;
-    int edges, columns;
-    double x0, y0, direction, half_length, blur;
+    int edges, columns, ramps;
+    double x0, y0, direction, half_length, blur, inside;
     double position[STRAIGHT_MOST_EDGES], slope[STRAIGHT_MOST_EDGES], contrast[STRAIGHT_MOST_EDGES];
     double *t, *s, *seen, *design;
     int64_t *at;
@@ -45,7 +46,7 @@ static void straight_gather(StraightFit *f, double reach) {
 
 /* Fill the design matrix: only its linear columns, or all columns. */
 static void straight_fill(StraightFit *f, int is_whole) {
-    int edges = f->edges, m = f->columns = is_whole ? 3 + 4 * edges : 2 + 2 * edges;
+    int edges = f->edges, m = f->columns = is_whole ? 3 + 4 * edges + f->ramps : 2 + 2 * edges;
     double cosine[STRAIGHT_MOST_EDGES], wide[STRAIGHT_MOST_EDGES], sigma[STRAIGHT_MOST_EDGES];
     for (int k = 0; k < edges; k++) {
         double normal_at = f->direction - atan(f->slope[k]), a = fabs(cos(normal_at)), b = fabs(sin(normal_at));
@@ -54,7 +55,7 @@ static void straight_fill(StraightFit *f, int is_whole) {
         sigma[k] = sqrt(f->blur * f->blur + square(smaller(a, b)) / 12.0);
     }
     for (int64_t i = 0; i < f->pixels; i++) {
-        double *d = f->design + i * m, s = f->s[i], by_blur = 0.0;
+        double *d = f->design + i * m, s = f->s[i], by_blur = 0.0, light = f->inside;
         d[0] = 1.0;
         d[1] = s;
         for (int k = 0; k < edges; k++) {
@@ -70,8 +71,13 @@ static void straight_fill(StraightFit *f, int is_whole) {
             d[2 + 2 * edges + k] = moved;
             d[2 + 3 * edges + k] = moved * s;
             by_blur += f->contrast[k] * (by_sigma * (f->blur / sigma[k]));
+            light += f->contrast[k] * step;
         }
-        if (is_whole) d[m - 1] = by_blur;
+        if (!is_whole) continue;
+        d[2 + 4 * edges] = by_blur;
+        if (!f->ramps) continue;
+        d[3 + 4 * edges] = f->t[i] - f->position[0] - f->slope[0] * s;
+        d[4 + 4 * edges] = d[3 + 4 * edges] * light;
     }
 }
 
@@ -152,6 +158,7 @@ static int straight_newton(StraightFit *f, int *has_contrast, double *change) {
         high = larger(high, f->s[i]);
     }
     double before = f->blur;
+    f->inside = f->found[0];
     f->blur += within(f->found[f->columns - 1], -0.3 * before, 0.5 * before);
     f->blur = within(f->blur, SMALLEST_BLUR_PX, LARGEST_BLUR_PX);
     *change = larger(larger(farthest, 0.5 * (high - low) * widest), 0.1 * fabs(f->blur - before));
@@ -175,6 +182,88 @@ static int straight_settle(StraightFit *f, int has_contrast) {
         if (change < SETTLED_PX && fabs(straight_band_reach(f->blur) - fitted) <= 0.5) return STRAIGHT_FITTED;
     }
     return STRAIGHT_NOT_SETTLED;
+}
+
+/* Residuals of the fit; returns the sum of their squares. */
+static double straight_residuals(const StraightFit *f, double *residual) {
+    double power = 0.0;
+    for (int64_t i = 0; i < f->pixels; i++) {
+        const double *d = f->design + i * f->columns;
+        residual[i] = f->seen[i];
+        for (int a = 0; a < f->columns; a++) residual[i] -= f->found[a] * d[a];
+        power += residual[i] * residual[i];
+    }
+    return power;
+}
+
+/* Mean and covariance of two slopes of the light, given their least-squares estimates and the covariance of these: the mean
+   over priors, each normal about zero, whose widths are multiples of the noise (zero, even light, is as probable as all others
+   together). */
+static void straight_average_slopes(const double *found, const double noise[2][2], double *mean, double spread[2][2]) {
+    static const double width[RAMP_WIDTHS_COUNT] = RAMP_WIDTHS;
+    double total = 0.0, first[2] = {0.0}, second[2][2] = {{0.0}}, least = INFINITY;
+    for (int turn = 0; turn < 2; turn++)
+        for (int i = 0; i < RAMP_WIDTHS_COUNT * RAMP_WIDTHS_COUNT; i++) {
+            int k = i / RAMP_WIDTHS_COUNT, l = i % RAMP_WIDTHS_COUNT;
+            double prior[2] = {square(width[k]) * noise[0][0], square(width[l]) * noise[1][1]}, own[2];
+            double a = noise[0][0] + prior[0], b = noise[0][1], c = noise[1][1] + prior[1], area = a * c - b * b;
+            double solved[2] = {(c * found[0] - b * found[1]) / area, (a * found[1] - b * found[0]) / area};
+            double unlikely = 0.5 * (log(area) + found[0] * solved[0] + found[1] * solved[1]);
+            if (!turn) {
+                least = smaller(least, unlikely);
+                continue;
+            }
+            double weight = exp(least - unlikely) * (k ? 1.0 : RAMP_WIDTHS_COUNT - 1.0) * (l ? 1.0 : RAMP_WIDTHS_COUNT - 1.0);
+            const double inverse[2][2] = {{c / area, -b / area}, {-b / area, a / area}};
+            total += weight;
+            for (int p = 0; p < 2; p++) own[p] = prior[p] * solved[p];
+            for (int p = 0; p < 2; p++) {
+                first[p] += weight * own[p];
+                for (int q = 0; q < 2; q++)
+                    second[p][q] += weight * (own[p] * own[q] + (p == q ? prior[p] : 0.0) - prior[p] * inverse[p][q] * prior[q]);
+            }
+        }
+    for (int p = 0; p < 2; p++) mean[p] = first[p] / total;
+    for (int p = 0; p < 2; p++)
+        for (int q = 0; q < 2; q++) spread[p][q] = second[p][q] / total - mean[p] * mean[q];
+}
+
+/* Subtract from the levels the slopes of the light across the edges, which move edges between sides of different slopes: one
+   that is equal on both sides, and one in proportion to the light, as of uneven illumination. Their uncertainty is the
+   covariance `added` of positions and slopes. */
+static void straight_level_light(StraightFit *f, double *levels, double *residual, double *inverse, double shared, double *added) {
+    int edges = f->edges, wanted = 2 * edges, m = 5 + 4 * edges;
+    double noise[2][2], mean[2], spread[2][2], effect[STRAIGHT_WANTED][2];
+    memset(added, 0, (size_t)(wanted * wanted) * sizeof(double));
+    f->ramps = 2;
+    straight_fill(f, 1);
+    f->ramps = 0;
+    if (!straight_least_squares(f) || !straight_invert(f->normal, m, inverse)) return;
+    double variance = straight_residuals(f, residual) / (double)larger_int(f->pixels - m, 1);
+    variance = larger(variance, ROUNDING) * larger(shared, 1.0);
+    for (int p = 0; p < 2; p++)
+        for (int q = 0; q < 2; q++)
+            noise[p][q] = variance * inverse[(m - 2 + p) * m + m - 2 + q] / (f->scale[m - 2 + p] * f->scale[m - 2 + q]);
+    double area = noise[0][0] * noise[1][1] - noise[0][1] * noise[1][0];
+    if (!(area > 0.0)) return;
+    straight_average_slopes(f->found + m - 2, noise, mean, spread);
+    for (int j = 0; j < wanted; j++) {
+        int own = 2 + wanted + j;
+        double by[2];
+        for (int p = 0; p < 2; p++) by[p] = variance * inverse[own * m + m - 2 + p] / (f->scale[own] * f->scale[m - 2 + p]);
+        for (int p = 0; p < 2; p++) effect[j][p] = (by[p] * noise[1 - p][1 - p] - by[1 - p] * noise[0][1]) / area;
+    }
+    for (int i = 0; i < wanted * wanted; i++)
+        for (int p = 0; p < 2; p++)
+            for (int q = 0; q < 2; q++) added[i] += effect[i / wanted][p] * spread[p][q] * effect[i % wanted][q];
+    /* The band of the next fit may lie up to a pixel aside. */
+    straight_gather(f, straight_band_reach(f->blur) + 1.0);
+    f->ramps = 2;
+    straight_fill(f, 1);
+    f->ramps = 0;
+    for (int64_t i = 0; i < f->pixels; i++)
+        for (int p = 0; p < 2; p++) levels[f->at[i]] -= mean[p] * f->design[i * m + m - 2 + p];
+    f->levels = levels;
 }
 
 /* Sum of products of every pixel's value and that of its neighbour at a lag; `place` is the index of each position of the
@@ -370,19 +459,21 @@ LOOP(straight_edge_fit_edges, "Fddddddiifff", "ii") {
     f->s = floats(most);
     f->seen = floats(most);
     f->at = ints(most);
-    f->design = floats(most * (3 + 4 * edges));
+    f->design = floats(most * (5 + 4 * edges));
+    double *level = floats(most), *residual = floats(most), added[STRAIGHT_WANTED * STRAIGHT_WANTED];
+    memcpy(level, f->levels, (size_t)most * sizeof(double));
     double inverse[STRAIGHT_MOST_COLUMNS * STRAIGHT_MOST_COLUMNS];
     out[0].i = straight_settle(f, in[8].i != 0);
+    /* A fit that does not settle may do so once the light is level. */
+    if (out[0].i == STRAIGHT_FITTED || out[0].i == STRAIGHT_NOT_SETTLED) {
+        straight_level_light(f, level, residual, inverse, in[6].d, added);
+        out[0].i = straight_settle(f, 1);
+    }
     out[1].i = f->pixels;
     if (out[0].i == STRAIGHT_FITTED && !straight_invert(f->normal, f->columns, inverse)) out[0].i = STRAIGHT_UNDETERMINED;
     if (out[0].i == STRAIGHT_FITTED) {
         int m = f->columns;
-        double *residual = f->seen, power = 0.0, shared[STRAIGHT_WANTED];
-        for (int64_t i = 0; i < f->pixels; i++) {
-            const double *d = f->design + i * m;
-            for (int a = 0; a < m; a++) residual[i] -= f->found[a] * d[a];
-            power += residual[i] * residual[i];
-        }
+        double power = straight_residuals(f, residual), shared[STRAIGHT_WANTED];
         double variance = larger(power / (double)larger_int(f->pixels - m, 1), ROUNDING);
         straight_share_noise(f, residual, inverse, power, shared);
         double rough = straight_pieces(f, residual, variance, told + 3, told + 4);
@@ -394,6 +485,7 @@ LOOP(straight_edge_fit_edges, "Fddddddiifff", "ii") {
                     variance * inverse[a * m + b] / (f->scale[a] * f->scale[b]) * sqrt(shared[i] * shared[j]);
             }
         straight_add_misfit(f, residual, variance, covariance);
+        for (int i = 0; i < wanted * wanted; i++) covariance[i] += added[i];
         memcpy(state, f->position, bytes);
         memcpy(state + edges, f->slope, bytes);
         memcpy(state + 2 * edges, f->contrast, bytes);
@@ -408,4 +500,6 @@ LOOP(straight_edge_fit_edges, "Fddddddiifff", "ii") {
     free(f->seen);
     free(f->at);
     free(f->design);
+    free(level);
+    free(residual);
 }

@@ -26,6 +26,8 @@ SMALLEST_BLUR_PX, LARGEST_BLUR_PX = 0.2, 8.0
 LARGEST_STEP_PX, LARGEST_TURN, SETTLED_PX, ITERATIONS = 1.0, 0.1, 5e-3, 25
 # Least contrast of an edge (grey levels), and relative regularisation for columns that are equal within rounding.
 LEAST_CONTRAST, RIDGE = 1e-3, 1e-9
+# Prior widths of slopes of the light across the edges, in standard deviations of their least-squares estimates.
+RAMP_WIDTHS = (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 # Lost share of a step whose effect on the profile is used to detect clipping.
 CUT = 0.1
 # Variance of rounding to whole grey levels, the least noise.

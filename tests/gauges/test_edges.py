@@ -41,6 +41,28 @@ def test_edges_are_unbiased_and_as_sure_as_they_say(tmp_path: Path, blur_px: flo
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("slope", [0.001, 0.004, -0.008])
+def test_uneven_light_does_not_move_edges(tmp_path: Path, slope: float) -> None:
+    """Light that grows by a share of itself in each pixel across the edge."""
+    rng = np.random.default_rng(15)
+    gauges = gauges_of(tmp_path, _edge(0))
+    lit = 1.0 + slope * (np.arange(SHAPE[1]) - 55.0)
+    errors, u = [], []
+    for _ in range(20):
+        x = 55 + rng.uniform(-3, 3)
+        light = drawn(SHAPE, 60, [(half_plane(x, 55, rng.uniform(-0.2, 0.2)), 160)]) * lit
+        for _ in range(10):
+            ((reading,),) = followed(gauges, [seen(light, 2.0, rng)])
+            assert reading.status is GaugeStatus.OK
+            value, u_value, _unit = reading.quantities[0].in_pixels()
+            errors.append(value - x)
+            u.append(u_value)
+    # 200 numbers of 20 pictures: 0.95 to three standard deviations.
+    assert share_within(errors, u) >= 0.95 - 0.046
+    assert float(np.sqrt(np.mean(np.square(errors)))) < 0.012
+
+
+@pytest.mark.slow
 def test_line_angles_reach_their_bound(tmp_path: Path) -> None:
     rng = np.random.default_rng(6)
     errors, u, length, blur = [], [], 60.0, 0.9
