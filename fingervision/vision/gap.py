@@ -25,19 +25,18 @@ from fingervision.vision.local_outline import FLATTEST, local_measuring_point
 from fingervision.vision.measuring_point import MeasuringPoint, measuring_point, squared
 from fingervision.vision.median import middle
 from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
+from fingervision.vision.outline_shapes import LikelyPoints, likely_points
 from fingervision.vision.profile_lines import INNER, PLACES, ROWS
 from fingervision.vision.residuals import (
     SHARED_POINTS,
-    corner_aside_px,
+    is_open,
     set_aside_variance,
     shape_holds,
     shared_points,
     spread,
 )
-from fingervision.vision.rough_corner import with_corner_doubt
-from fingervision.vision.roughness import best_linear, roughness, with_roughness
+from fingervision.vision.roughness import SUSPECT, best_linear, roughness, with_roughness
 from fingervision.vision.third_tone import THIRD_TONE
-from fingervision.vision.unlike_fingers import NO_CHAINS, Chains, chain_of_one, explains_roughness, polygonal
 
 Floats = NDArray[np.float64]
 
@@ -126,14 +125,12 @@ def measure_gap(
     if min(len(p.x) for p in points) < FEWEST_LINES:
         return behind or NoGap(Status.NO_FINGERS, "Too little of a finger's outline is in view for a measurement.")
     shape = _described(points, below_tip_px, max(coded_points, edges.shared_lines), known)
-    points, rough, noise_shared = shape.points, shape.rough, shape.noise_shared
+    points, rough = shape.points, shape.rough
     left, right = shape.ends
-    shared = max(shared_points(points, (left, right), coded_points), noise_shared)
+    shared = max(shared_points(points, (left, right), coded_points), shape.noise_shared)
     fitted = [
         measuring_point(end, below_tip_px, float(p.blur[0])) for p, end in zip(points, (left, right), strict=True)
     ]
-    if rough is not None:
-        fitted = with_corner_doubt(list(points), [left, right], fitted, below_tip_px, rough.shared_px)
     stray = 1.0 if rough is None else rough.shared_px
     holds = [shape_holds(*one, below_tip_px, stray) for one in zip(points, (left, right), fitted, strict=True)]
     refusal = _no_fingers(fingers, (left, right), below_tip_px, steepest)
@@ -144,14 +141,14 @@ def measure_gap(
         held = held_part(fingers, (left, right), (spread(left) * shared, spread(right) * shared), light_gap)
     if behind is not None:
         return replace(behind, held=held)
-    chains, measured = _measuring_points(shape, fitted, holds, below_tip_px, shared, coding)
+    likely, measured = _measuring_points(shape, fitted, holds, below_tip_px, shared, coding)
     if isinstance(measured, NoGap):
         return measured
-    is_straight = chains is not None and None not in chains
+    is_smooth = likely is not None and _is_smooth(likely)
     has_part = any(finger.hidden.size for finger in (fingers.left, fingers.right))
     least_px = LEAST_SURE_PX if rough is None or has_part else LEAST_SURE_AT_FIRST_PX
     largest_variance = least_px**2 * coded_points
-    roughness_px = nan if shape.is_untold and not is_straight else 0.0  # fitting straight sides have no roughness
+    roughness_px = nan if shape.is_untold and not is_smooth else 0.0
     roughness_px = roughness_px if rough is None else rough.deviation_px
     outcome = _assemble(fingers, edges, measured, below_tip_px, light_gap, largest_variance, roughness_px, held)
     if outcome is TOO_ROUGH:
@@ -178,8 +175,7 @@ def specimen_roughness(seen: Sequence[tuple[CoarseFingers, EdgePoints]], below_t
         rough = roughness(points, (left, right))
         if rough is None or not rough.is_told:
             continue
-        chains = polygonal(points, below_tip_px, edges.shared_lines)
-        if explains_roughness(chains, points, (left, right), rough.deviation_px):
+        if _is_smooth(likely_points(points, (left, right), (None, None), below_tip_px, edges.shared_lines)):
             return None
         told.append((rough.covariance, fingers.are_long))
     if 2 * len(told) <= len(seen):
@@ -196,42 +192,46 @@ class _Shapes:
     ----------
     points : (OutlinePoints, OutlinePoints)
         Points of the outlines, with the roughness of the flanks among their variances.
-    ends : (FingerEnd, FingerEnd)
-        Sides with fillets.
-    chains : (MeasuringPoint or None, MeasuringPoint or None), or None
-        Measuring points of chains of straight sides, where these were tried.
+    fits, ends : list of FingerEnd, (FingerEnd, FingerEnd)
+        Sides with fillets, and the same with tops perpendicular to the flanks where the points do not contradict this.
+    likely : LikelyPoints or None
+        Measuring points by the likeliest shapes, where these explain what seemed to be roughness.
     rough : Roughness or None
         Roughness of the flanks, if there is any.
-    are_corners, is_untold : bool
-        Whether corners explain what seemed to be roughness; whether the flanks are too short to determine it.
+    is_untold : bool
+        Whether the flanks are too short to determine it.
     noise_shared : float
         Number of neighbouring points with a common error.
     """
 
     points: tuple[OutlinePoints, OutlinePoints]
+    fits: list[FingerEnd]
     ends: tuple[FingerEnd, FingerEnd]
-    chains: Chains | None
+    likely: LikelyPoints | None
     rough: Roughness | None
-    are_corners: bool
     is_untold: bool
     noise_shared: float
+
+
+def _is_smooth(likely: LikelyPoints) -> bool:
+    """Whether a shape describes both outlines down to their noise."""
+    return None not in likely.points and likely.misfit < SUSPECT
 
 
 def _described(
     points: tuple[OutlinePoints, OutlinePoints], below_tip_px: float, noise_shared: float, known: Roughness | None
 ) -> _Shapes:
-    """Fit the shape of each finger's end, and tell rough flanks from corners."""
+    """Fit sides with fillets to each finger's end, and tell rough flanks from corners."""
     guesses = [first_guess(p, below_tip_px) for p in points]
     fits = [fit_from_any_radius(p, *guess) for p, guess in zip(points, guesses, strict=True)]
     rough = roughness(points, (fits[0], fits[1]), known)
     is_untold = rough is not None and not rough.is_told
     rough = None if is_untold else rough
-    chains, are_corners = None, False
+    likely = None
     if rough is not None and known is None:
         # Corners that are not part of the three-sided shape cause residuals like those of roughness.
-        chains = polygonal(points, below_tip_px, noise_shared)
-        are_corners = explains_roughness(chains, points, (fits[0], fits[1]), rough.deviation_px)
-        chains, rough = (chains, None) if are_corners else (None, rough)
+        likely = likely_points(points, fits, (None, None), below_tip_px, noise_shared)
+        likely, rough = (likely, None) if _is_smooth(likely) else (None, rough)
     if rough is not None:
         bare = points
         points = (with_roughness(points[0], rough, fits[0]), with_roughness(points[1], rough, fits[1]))
@@ -241,7 +241,7 @@ def _described(
         ]
         noise_shared = max(noise_shared, rough.shared_px)
     ends = (squared(fits[0]), squared(fits[1]))
-    return _Shapes(points, ends, chains, rough, are_corners, is_untold, noise_shared)
+    return _Shapes(points, fits, ends, likely, rough, is_untold, noise_shared)
 
 
 def _measuring_points(
@@ -251,47 +251,36 @@ def _measuring_points(
     below_tip_px: float,
     shared: float,
     coding: Coding,
-) -> tuple[Chains | None, list[MeasuringPoint] | NoGap]:
-    """Measuring points of both fingers by the shape that describes them best, and the chains that were tried."""
-    points, (left, right), chains = shape.points, shape.ends, shape.chains
+) -> tuple[LikelyPoints | None, list[MeasuringPoint] | NoGap]:
+    """Measuring points of both fingers: by fillets where they leave nothing, else by the likeliest shapes."""
+    points, ends, likely = shape.points, shape.ends, shape.likely
     aside = [
         set_aside_variance(p, end, found.edge, found.tip + below_tip_px)
-        for p, end, found in zip(points, (left, right), fitted, strict=True)
+        for p, end, found in zip(points, ends, fitted, strict=True)
     ]
-    cuts_px = [corner_aside_px(*one, below_tip_px) for one in zip(points, (left, right), fitted, strict=True)]
-    if chains is None and (not all(holds) or any(aside) or any(cuts_px)):
-        chains = polygonal(points, below_tip_px, shape.noise_shared)
-    if all(cuts_px):  # the corners are no fillets, so that the edge lies between the fitted shape and rejected points
-        aside = [beyond + 2.0 / 3.0 * cut_px**2 for beyond, cut_px in zip(aside, cuts_px, strict=True)]
-    measured = [] if chains is None else [chain for chain in chains if chain is not None]
-    if len(measured) == len(fitted) and all(holds):  # what knows its points better
-        variances = [found.covariance[1, 1] + beyond for found, beyond in zip(fitted, aside, strict=True)]
-        measured = measured if sum(own.covariance[1, 1] for own in measured) < sum(variances) else []
-    if len(measured) == len(fitted):
-        return chains, measured
-    own_chains = chains or NO_CHAINS
+    are_open = [is_open(*one, below_tip_px, shared) for one in zip(points, ends, fitted, strict=True)]
+    if likely is None and (not all(holds) or any(aside) or any(are_open) or shape.rough is not None):
+        known = [found if does_hold else None for found, does_hold in zip(fitted, holds, strict=True)]
+        likely = likely_points(points, shape.fits, known, below_tip_px, shape.noise_shared)
     # A codec's errors extend over its blocks, also where the quantiser states their size.
     stray = max(shape.noise_shared, SHARED_POINTS[coding])
-    if not shape.are_corners or len(measured) != 1:
-        own_chains = chain_of_one(own_chains, (left, right), holds, cuts_px)
-    are_known = all(does_hold or chain is not None for does_hold, chain in zip(holds, own_chains, strict=True))
     measured = []
-    for p, end, found, does_hold, beyond, chain in zip(
-        points, (left, right), fitted, holds, aside, own_chains, strict=True
-    ):
-        own = chain if are_known else local_measuring_point(p, below_tip_px, shape.noise_shared)
+    for k, (p, end, found, does_hold, beyond) in enumerate(zip(points, ends, fitted, holds, aside, strict=True)):
+        own = None if likely is None else likely.points[k]
+        if own is None and not does_hold:
+            own = local_measuring_point(p, below_tip_px, shape.noise_shared)
         # If there is no other description of the outline, residuals that common errors of neighbouring points may
         # cause do not reject the shape.
         if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, stray)):
             if found.apex < p.x.min() - 1.0:
-                return chains, NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
+                return likely, NoGap(Status.TIP_OUT_OF_VIEW, "A finger's tip lies beyond the picture's border.")
             covariance = found.covariance * (spread(end) * shared if shape.rough is None else 1.0)
             covariance[1, 1] += beyond
             own = MeasuringPoint(found.tip, found.apex, found.edge, found.slope, covariance)
         if own is None:
-            return chains, NoGap(Status.NO_FINGERS, BROKEN_BY[coding])
+            return likely, NoGap(Status.NO_FINGERS, BROKEN_BY[coding])
         measured.append(own)
-    return chains, measured
+    return likely, measured
 
 
 def _why_too_rough(edges: EdgePoints, measured: list[MeasuringPoint], has_part: bool) -> NoGap:

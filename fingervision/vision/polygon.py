@@ -28,13 +28,10 @@ class Side(NamedTuple):
     y: float
     angle: float
 
-    def shifted(self, px: float) -> "Side":
-        """Return the side displaced outwards by a distance."""
-        return Side(self.x + px * sin(self.angle), self.y - px * cos(self.angle), self.angle)
-
-    def turned(self, radians: float) -> "Side":
-        """Return the side rotated about the point by which it is given."""
-        return Side(self.x, self.y, self.angle + radians)
+    def moved(self, px: float, radians: float) -> "Side":
+        """Return the side displaced outwards by a distance, and rotated about the point by which it is given."""
+        x, y = self.x + px * sin(self.angle), self.y - px * cos(self.angle)
+        return Side(x, y, self.angle + radians)
 
 
 class ReadOff(NamedTuple):
@@ -75,6 +72,11 @@ class Polygon(NamedTuple):
             middle = one.angle + 0.5 * turn
             found.append(Corner(vertex, (-sin(middle), cos(middle)), turn))
         return found
+
+    def is_chain(self) -> bool:
+        """Whether the chain is convex, and every side long enough for the fillets at its ends."""
+        corners = self.corners()
+        return corners is not None and _Ends.of(self.sides, corners, self.radii) is not None
 
     def read_off(self, below_tip_px: float) -> ReadOff | None:
         """Tip, and inner edge at the measuring height below the tip; None if the chain does not determine them."""
@@ -152,56 +154,19 @@ class _Ends(NamedTuple):
 Floats = NDArray[np.float64]
 
 # Turns (radians) for which a sharp corner's half-level is computed; between them it is interpolated to 1e-4 sigma.
-TURNS: Floats = np.linspace(0.0, MOST_TURN, 261)
+TURNS: Floats = np.linspace(LEAST_TURN, MOST_TURN, 261)
 # Number of halvings of the interval that contains the half-level.
 HALVINGS = 30
-# Coefficient c of the model exp(-c s^2) for the decrease of the blur's effect along the sides, where s is the distance
-# from the vertex in sigma. The value is fitted to the exact half-level of a right-angled corner, Phi(a) Phi(s) = 1/2
-# with the depth a, between s = 0.5 and 2.
-FALL = 0.4
 
 
-def corner_half_level(beside: Floats, radius: Floats, turn: float, blur: float) -> Floats:
-    """Distance of a rounded, blurred corner's half-level contour from the vertex, at points beside the bisector.
-
-    The effects of fillet and blur are added in quadrature, which is exact for a sharp corner and at the middle of a
-    fillet.
-
-    Parameters
-    ----------
-    beside : ndarray of float
-        Distance from the bisector (pixels).
-    radius : ndarray of float
-        Radius of the fillet (pixels), of a shape that broadcasts with `beside`.
-    turn : float
-        Change of the outline's direction at the corner (radians).
-    blur : float
-        Gaussian sigma of the optics (pixels).
-    """
-    half = 0.5 * turn
-    on_arc = np.sqrt(np.maximum(radius**2 - beside**2, 0.0))
-    arc = np.where(np.abs(beside) < radius * sin(half), radius / cos(half) - on_arc, np.abs(beside) * tan(half))
-    along = beside / (blur * cos(half))
-    return np.asarray(np.sqrt(arc**2 + (corner_retreat(turn) * blur) ** 2 * np.exp(-FALL * along**2)))
-
-
-def corner_retreat(turn: float) -> float:
-    """Distance of the half-level from the vertex of a blurred sharp corner, along its bisector, in units of sigma.
+@cache
+def corner_retreats() -> Floats:
+    """Distance of the half-level from the vertex of blurred sharp corners of all `TURNS`, along the bisector, in sigma.
 
     At a depth a (in sigma) inside both sides of a wedge whose sides turn by theta, the blurred coverage is Phi(a) - 2
     T(a, tan(theta / 2)), with T Owen's function (Ann. Math. Stat. 27, 1956, doi:10.1214/aoms/1177728074); the
     half-level is where the coverage equals one half.
-
-    Parameters
-    ----------
-    turn : float
-        Change of the outline's direction at the corner (radians); 0 for a straight outline.
     """
-    return float(np.interp(turn, TURNS, _retreats()))
-
-
-@cache
-def _retreats() -> Floats:
     low, high = np.zeros(TURNS.size), np.full(TURNS.size, 6.0)
     for _halving in range(HALVINGS):
         depth = 0.5 * (low + high)

@@ -1,12 +1,15 @@
 """Residuals of a finger end's fitted shape: the uncertainty that they imply, and whether the shape is rejected."""
 
+from math import hypot, sqrt
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fingervision.domain.frame import Coding
 from fingervision.domain.loops import loop
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import INNER_R, PARAMETERS
+from fingervision.vision.finger_shape import INNER_R, OUTER_R, PARAMETERS, TOP_M
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
 
@@ -29,12 +32,12 @@ SHAPE_REACH_PX, FEWEST_NEAR = 8.0, 3.0
 # Share of rejected points near the measuring point above which they are not dust but the finger's shape; weight below
 # which a point counts as rejected.
 MOST_REJECTED, LEAST_COUNTED = 0.5, 0.05
-# Least number of rejected points near the corners of both fingers that indicates cut corners. Dust seldom hides so many
-# points at both fingers, whereas a straight cut lies on both sides of the fillet that fits best.
+# Least number of rejected points of a finger's end that may be corners of another shape.
 FEWEST_OF_CORNER = 3
-# A fillet that ends above this share of the way to the measuring height does not shift the edge there, whatever the
-# corner is (in compressed pictures, ringing displaces the points of sharp corners).
-FILLET_SHARE = 0.9
+# A fillet of radius r and the cut of the same area: chi-square of their difference, in units of r^3 / u^2; difference
+# in height of inclined tips, in radii; expected chi-square (with errors of a fitted shape, e^20 to one) below which the
+# outline does not decide between them; and what blur hides of the difference, in sigma.
+CUT_CHI_SQUARE, CUT_LOWER, UNDECIDED, U_BLURRED = 1.35e-3, 0.345, 200.0, 0.05
 # Where most of the points within so many pixels above or below the measuring point are rejected, or half of them on
 # both sides, they may be the finger's own edge (a corner that is cut off, a bend) and not dust.
 BESIDE_PX = 4.0
@@ -44,6 +47,26 @@ TIP_BEYOND_IN_BLURS, TIP_BEYOND_PX = 1.5, 0.5
 # Largest distance of the measuring point from the nearest point of the outline (pixels), beyond which it would be
 # extrapolated.
 FARTHEST_POINT_PX = 2.5
+
+
+class Residuals(Protocol):
+    """Residuals of a fitted shape: in units of the points' uncertainties, the points' weights, and their spread."""
+
+    @property
+    def residual(self) -> Floats:
+        """Normal distance of every point in units of its uncertainty, shape (n,)."""
+        ...
+
+    @property
+    def robust(self) -> Floats:
+        """Weight of every point between 0 and 1, shape (n,)."""
+        ...
+
+    @property
+    def misfit(self) -> float:
+        """Ratio of the residuals' spread to the points' uncertainties."""
+        ...
+
 
 _shared = loop("residuals_shared")
 _roughness = loop("residuals_roughness")
@@ -72,14 +95,14 @@ def shared_points(
 
 
 def shape_holds(
-    points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float, stray: float = 1.0
+    points: OutlinePoints, end: Residuals, found: MeasuringPoint, below_tip_px: float, stray: float = 1.0
 ) -> bool:
-    """Whether the three-sided shape leaves no systematic residuals near the measuring point and near the tip.
+    """Whether a shape leaves no systematic residuals near the measuring point and near the tip.
 
     Parameters
     ----------
-    points, end, found : OutlinePoints, FingerEnd, MeasuringPoint
-        Outline points, fitted end and measuring point of one finger.
+    points, end, found : OutlinePoints, FingerEnd or Chain, MeasuringPoint
+        Outline points, fitted shape and measuring point of one finger.
     below_tip_px : float
         Distance of the measuring point below the tip.
     stray : float
@@ -107,10 +130,12 @@ def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, heigh
     return float(2.0 / 3.0 * _set_aside(points.x, points.y, points.u, end.residual, end.robust, edge, height) ** 2)
 
 
-def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float) -> float:
-    """Largest residual (px) of the rejected points between tip and inner edge, for a corner that is not a fillet.
+def is_open(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float, shared: float) -> bool:
+    """Whether corners of another shape may explain the outline too: points were rejected, or a fillet is small.
 
-    The result is 0 if too few points of the corner were rejected.
+    A fillet of radius r and the cut of the same area nowhere differ by more than 0.06 r. Over the corner's points this
+    is a chi-square of about 1.35e-3 r^3 / u^2, and tips that are inclined by an angle differ in height by 0.35 r times
+    its sine.
 
     Parameters
     ----------
@@ -118,14 +143,18 @@ def corner_aside_px(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint
         Outline points, fitted end and measuring point of one finger.
     below_tip_px : float
         Distance of the measuring point below the tip.
+    shared : float
+        Number of neighbouring points that share an error.
     """
-    is_aside = end.robust <= 0.0
-    if np.count_nonzero(is_aside) < FEWEST_OF_CORNER:
-        return 0.0
-    is_aside &= (points.x > found.apex) & (points.y < found.tip + below_tip_px + SHAPE_REACH_PX)
-    if np.count_nonzero(is_aside) < FEWEST_OF_CORNER or end.parameters[INNER_R] < FILLET_SHARE * below_tip_px:
-        return 0.0
-    return float(np.max(np.abs(end.residual * points.u)[is_aside]))
+    is_aside = (end.robust <= 0.0) & (points.y < found.tip + below_tip_px + SHAPE_REACH_PX)
+    if np.count_nonzero(is_aside) >= FEWEST_OF_CORNER:
+        return True
+    u_px = hypot(float(np.median(points.u)), U_BLURRED * float(np.median(points.blur)))
+    for radius in end.parameters[[INNER_R, OUTER_R]].tolist():
+        is_felt = CUT_LOWER * radius * abs(float(end.parameters[TOP_M])) > sqrt(found.covariance[0, 0])
+        if is_felt and CUT_CHI_SQUARE * radius**3 < UNDECIDED * shared * u_px**2:
+            return True
+    return False
 
 
 def is_on_outline(points: OutlinePoints, edge: float, height: float) -> bool:

@@ -80,12 +80,14 @@ def test_a_camera_that_sharpens_is_not_corrected_and_said(recording: Recording) 
     assert "three widths" in camera.response.words
 
 
-def test_a_response_under_which_hardly_a_frame_has_a_gap_is_not_taken() -> None:
+def test_most_frames_have_a_gap_under_the_response_that_is_taken() -> None:
+    """Under a wrong curve, glare beside the edges hid the gap in 23 frames of 24."""
     film = CLASSES["linear-h264"](drawn(1_402_001, WANTED + 1, SURFACES["glare"]))
     frames, camera = learnt_first(film, SETTINGS, SCALE)
-    assert camera.response.curve is SETTINGS.camera.response.curve
-    first = next(iter(frames))
-    assert isinstance(measure_frame(first, replace(SETTINGS, camera=camera)), GapMeasurement)
+    settings = replace(SETTINGS, camera=camera)
+    found = [isinstance(measure_frame(frame, settings), GapMeasurement) for frame in frames]
+    assert len(found) == WANTED + 1
+    assert sum(found) > 0.75 * len(found)
 
 
 def test_a_stated_response_is_kept(recording: Recording) -> None:

@@ -190,7 +190,7 @@ def test_clutter_is_never_a_number(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("coding", list(Coding))
 def test_a_broken_outline_blames_a_lossy_recording_only_where_the_recording_is_lossy(coding: Coding) -> None:
-    rng = np.random.default_rng(2)
+    rng = np.random.default_rng(1)
     scene = two_fingers(150.0, radius_px=30.0, tip_at_px=120.4)
     dirty = Scene(scene.fingers, behind=scene.behind, light=scene.light, before=dust(540, rng, size_px=(2.0, 9.0)))
     found = measure_frame(Frame(render(dirty, CAMERA, rng), 0, 0.0, coding), SETTINGS)
