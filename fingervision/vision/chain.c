@@ -46,12 +46,16 @@ static Away from_sharp_corner(const Corner *c, double x, double y, double blur, 
 }
 
 static Away from_corner(const Corner *c, double x, double y, double u, int is_row, double blur, double retreat) {
-    double felt, share = within((c->radius / blur - SHARP_BELOW) / (ROUND_ABOVE - SHARP_BELOW), 0.0, 1.0);
+    double felt = 0.0, share = within((c->radius / blur - SHARP_BELOW) / (ROUND_ABOVE - SHARP_BELOW), 0.0, 1.0);
     Spot at = spot(c, x, y);
-    Away sharp = from_sharp_corner(c, x, y, blur, retreat, &felt);
-    double round = at.distance + half_level(c, &at, x - c->centre_x, y - c->centre_y, blur);
-    Away found = {share * round + (1.0 - share) * sharp.distance, share * at.to_flank + (1.0 - share) * sharp.to_one,
-                  share * at.to_top + (1.0 - share) * sharp.to_two, 0.0, at.is_on_fillet};
+    Away found = {at.distance, at.to_flank, at.to_top, 0.0, at.is_on_fillet};
+    if (share > 0.0) found.distance += half_level(c, &at, x - c->centre_x, y - c->centre_y, blur);
+    if (share < 1.0) {
+        Away sharp = from_sharp_corner(c, x, y, blur, retreat, &felt);
+        found.distance = share * found.distance + (1.0 - share) * sharp.distance;
+        found.to_one = share * found.to_one + (1.0 - share) * sharp.to_one;
+        found.to_two = share * found.to_two + (1.0 - share) * sharp.to_two;
+    }
     found.normal_u = hypot(u * slant(c, &at, is_row), U_CONTOUR_IN_BLURS * blur * felt * (1.0 - share));
     return found;
 }
@@ -106,8 +110,9 @@ static int from_chain(const Arg *in) {
         int64_t k = corner_of(sides, sharp, count, x, y);
         const Corner *c = &corners[k];
         Away at = from_corner(c, x, y, u, FLAGS(6)[i], blur[i], retreats[k]);
-        double wide = from_corner(&wider[k], x, y, u, FLAGS(6)[i], blur[i], retreats[k]).distance;
         FLOATS(12)[i] = at.distance / at.normal_u;
+        if (!in[13].n) continue;
+        double wide = from_corner(&wider[k], x, y, u, FLAGS(6)[i], blur[i], retreats[k]).distance;
         by[2 * count + k] = (wide - at.distance) / (STEP_PX * at.normal_u);
         for (int two = 0; two < 2; two++) {
             const double *side = sides + 3 * (k + two);
@@ -150,7 +155,8 @@ static void weighed_chain(const Arg *in, double patience, const double *away, co
 
 /* Fit of a chain by Gauss-Newton steps. Arguments: sides (n, 3) and radii (n - 1), which are replaced; standard deviations of
    the priors (m); x, y, u, is_row, blur; patience of every step; factor on the variances; retreats of blurred sharp
-   corners; results, information (m, m) with m = 3 n - 1, residuals, derivatives (points, m),
+   corners; results, information (m, m) with m = 3 n - 1, residuals, derivatives (points, m; or
+   none, and no information, where only the residuals are wanted),
    and how far every unknown is from its prior's mean (m); turns of
    the blurred corners. Returns whether the sides are convex. */
 LOOP(chain_fit, "ffFFFFBFFdFffffF", "b") {
@@ -188,5 +194,5 @@ LOOP(chain_fit, "ffFFFFBFFdFffffF", "b") {
         out[0].i = from_chain(in);
         if (patience == 1.0 && length < SETTLED) break;
     }
-    weighed_chain(in, 1.0, away, prior, information, gradient);
+    if (in[13].n) weighed_chain(in, 1.0, away, prior, information, gradient);
 }

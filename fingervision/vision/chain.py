@@ -10,7 +10,7 @@ and Rubin, J. R. Stat. Soc. B 39, 1977, doi:10.1111/j.2517-6161.1977.tb01600.x).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import atan2, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,19 +134,17 @@ def fit_chain(
     """
     sides, radii = np.array(start.sides), np.array(start.radii)
     u_prior = np.concatenate([start.u_places, np.full(len(sides), U_ANGLE), start.u_radii])
-    unknowns = 3 * len(sides) - 1
-    information, away = np.empty((unknowns, unknowns)), np.empty(unknowns)
-    residual, jacobian = np.empty(points.x.size), np.empty((points.x.size, unknowns))
-    seen = (points.x, points.y, points.u, points.is_row, points.blur)
     if patience is None:
         tolerant = max(TOLERATED_PX / float(np.median(points.u)), 10.0)
         patience = [*np.geomspace(tolerant, 1.0, STARTING, endpoint=False).tolist(), *SETTLING]
-    steps = np.array(patience, dtype=np.float64)
-    results = (information, residual, jacobian, away)
-    if not _fit(sides, radii, u_prior, *seen, steps, variance, corner_retreats(), *results, TURNS):
+    unknowns = u_prior.size
+    information, jacobian = np.empty((unknowns, unknowns)), np.empty((points.x.size, unknowns))
+    residual, away = np.empty(points.x.size), np.empty(unknowns)
+    how = (np.array(patience, dtype=np.float64), variance, corner_retreats())
+    if not _fit(sides, radii, u_prior, *_seen(points), *how, information, residual, jacobian, away, TURNS):
         return None
     polygon = Polygon([Side(*side) for side in sides.tolist()], radii.tolist(), None)
-    if len(steps) and not polygon.is_chain():
+    if patience and not polygon.is_chain():
         return None
     log_volume = float(np.linalg.slogdet(information * np.outer(u_prior, u_prior))[1])
     misfit = _misfit(residual, variance) + float(np.sum((away / u_prior) ** 2))
@@ -154,6 +152,10 @@ def fit_chain(
     covariance: Floats = np.asarray(np.linalg.inv(information), dtype=np.float64)
     log_evidence = -0.5 * (misfit + log_volume)
     return Chain(polygon, start.u_places, start.u_radii, covariance, residual, weight, log_evidence)
+
+
+def _seen(points: OutlinePoints) -> tuple[NDArray[Any], ...]:
+    return points.x, points.y, points.u, points.is_row, points.blur
 
 
 def with_small_radii(points: OutlinePoints, chain: Chain, variance: float) -> Chain:
@@ -165,16 +167,16 @@ def with_small_radii(points: OutlinePoints, chain: Chain, variance: float) -> Ch
     sides, radii, count = chain.polygon.sides, chain.polygon.radii, len(chain.polygon.sides)
     blur, covariance = float(points.blur[0]), chain.covariance.copy()
     log_evidence = chain.log_evidence
+    u_prior, away, nothing = np.ones(3 * count - 1), np.empty(3 * count - 1), np.empty((0, 0))
+    residual, how = np.empty(points.x.size), (np.empty(0), variance, corner_retreats())
     for k, radius in enumerate(radii):
         if radius >= ROUND_ABOVE * blur:
             continue
         tried, misfit = SMALL_RADII * blur, []
         for other in tried.tolist():
-            start = Start(sides, [*radii[:k], other, *radii[k + 1 :]], chain.u_places, chain.u_radii)
-            found = fit_chain(points, start, variance, ())
-            misfit.append(
-                np.inf if found is None else _misfit(found.residual, variance) + (other / chain.u_radii[k]) ** 2
-            )
+            changed = np.array([*radii[:k], other, *radii[k + 1 :]])
+            _fit(np.array(sides), changed, u_prior, *_seen(points), *how, nothing, residual, nothing, away, TURNS)
+            misfit.append(_misfit(residual, variance) + (other / chain.u_radii[k]) ** 2)
         likely = np.exp(-0.5 * (np.array(misfit) - min(misfit)))
         square = np.trapezoid(likely * (tried - radius) ** 2, tried) / np.trapezoid(likely, tried)
         place = 2 * count + k
