@@ -264,11 +264,12 @@ def _measuring_points(
         likely = likely_points(points, shape.fits, known, below_tip_px, shape.noise_shared)
     # A codec's errors extend over its blocks, also where the quantiser states their size.
     stray = max(shape.noise_shared, SHARED_POINTS[coding])
+    by_shape = [None, None] if likely is None else likely.points
+    # An outline of another shape is usually that of both fingers, and one method gives both the same errors.
+    are_known = all(does_hold or own is not None for does_hold, own in zip(holds, by_shape, strict=True))
     measured = []
-    for k, (p, end, found, does_hold, beyond) in enumerate(zip(points, ends, fitted, holds, aside, strict=True)):
-        own = None if likely is None else likely.points[k]
-        if own is None and not does_hold:
-            own = local_measuring_point(p, below_tip_px, shape.noise_shared)
+    for p, end, found, does_hold, beyond, likeliest in zip(points, ends, fitted, holds, aside, by_shape, strict=True):
+        own = likeliest if are_known else local_measuring_point(p, below_tip_px, shape.noise_shared) or likeliest
         # If there is no other description of the outline, residuals that common errors of neighbouring points may
         # cause do not reject the shape.
         if own is None and (does_hold or shape_holds(p, end, found, below_tip_px, stray)):

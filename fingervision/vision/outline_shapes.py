@@ -113,7 +113,7 @@ def likely_points(
         for k, (chain, share) in enumerate(zip(own, shares.tolist(), strict=True)):
             own[k] = None if chain is None or share < HOPELESS else with_small_radii(p, chain, variance)
     found = [
-        _averaged(p, own, shares, known if is_same else None, below_tip_px, variance, STRAIGHTEST * shared)
+        _averaged(p, own, shares, known if is_same else None, below_tip_px, variance)
         for p, own, shares, known, is_same in zip(points, shapes, _probabilities(shapes), fitted, is_own, strict=True)
     ]
     return LikelyPoints(found, sqrt(variance / shared))
@@ -200,7 +200,6 @@ def _averaged(
     fitted: MeasuringPoint | None,
     below_tip_px: float,
     variance: float,
-    largest_spread: float,
 ) -> MeasuringPoint | None:
     """Mean of the measuring points of the shapes that describe the outline; None if the likeliest does not."""
     found = []
@@ -208,7 +207,7 @@ def _averaged(
         if chain is None or share < NEGLIGIBLE:
             continue
         own = fitted if k == 0 and fitted is not None else chain_point(chain, below_tip_px)
-        is_described = chain.spread <= largest_spread and float(np.mean(chain.robust < 0.5)) < MOST_DUST
+        is_described = chain.spread <= STRAIGHTEST and float(np.mean(chain.robust < 0.5)) < MOST_DUST
         if own is None or not is_described or not shape_holds(points, chain, own, below_tip_px, variance):
             if share > 0.5:
                 return None
