@@ -3,7 +3,8 @@
 The picture is compared with its reflection through a point, `I(c + x) - I(c - x)`; the centre is the point with the
 least sum of squares (Gauss-Newton). Only the symmetry is assumed, not the mark's size, blur or tone. The variance is
 that of a fit with known shape of the mark, `sigma^2 (sum g g')^-1`, the Cramer-Rao bound: the gradient of the
-difference is doubled, and the variance of its noise is doubled too. A linear gradient of light is subtracted.
+difference is doubled, and the variance of its noise is doubled too. Pixels count as far as the gradients of their ring
+exceed the noise. A linear gradient of light is subtracted.
 """
 
 from dataclasses import dataclass
@@ -17,8 +18,9 @@ from fingervision.vision.spline_interpolation import coefficients, interpolated_
 
 Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
-ITERATIONS, SETTLED_PX, LARGEST_STEP_PX = 20, 2e-3, 1.0
+ITERATIONS, SETTLED_PX, NEAR_PX, LARGEST_STEP_PX = 30, 2e-3, 0.02, 1.0
 # Number of pixels beyond the window that the five-point formula for derivatives needs, and its variance for unit noise.
 # The three-point formula would underestimate the gradients of an edge with a blur of one pixel by a tenth, and
 # overestimate the uncertainty accordingly.
@@ -85,6 +87,7 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
     dx, dy = (v[inner].ravel().astype(np.float64) for v in (x, y))
     basis = np.stack((dx, dy)) / np.sqrt((dx**2).sum())
     at_x, at_y = start
+    ring = np.rint(np.hypot(dx, dy)).astype(np.intp)
     begin = np.zeros(1, dtype=np.intp)
 
     def window(turned: bool = False) -> Floats:
@@ -94,6 +97,7 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
             raise NoSymmetryError("the mark lies partly outside its search zone")
         return sampled(flat, begin, width, px, py).reshape(size + 2 * RIM, size + 2 * RIM)
 
+    length, is_near = np.inf, False
     for _iteration in range(ITERATIONS):
         seen = window()
         difference = (seen[inner] - seen[inner][::-1, ::-1]).ravel().astype(np.float64)
@@ -101,29 +105,55 @@ def fit_symmetry(part: Floats, start: tuple[float, float], half_px: int, shared_
         by_x, by_y = _derivative(seen[RIM:-RIM]), _derivative(seen[:, RIM:-RIM].T).T
         odd = np.stack([(g - g[::-1, ::-1]).ravel() for g in (by_x, by_y)])
         odd -= (odd @ basis.T) @ basis
-        normal = odd @ odd.T
+        # Far from the centre, the difference shows the mark itself and not the noise.
+        is_near |= length < NEAR_PX
+        weight = _weights(odd, difference, ring, (at_x, at_y)) if is_near else np.ones(difference.size)
+        normal = (weight * odd) @ odd.T
         if np.linalg.det(normal) <= 0.0:
             raise NoSymmetryError("the mark has no contrast")
-        step = -np.linalg.solve(normal, odd @ difference)
+        step = -np.linalg.solve(normal, (weight * odd) @ difference)
         length = float(np.hypot(*step))
         step *= min(1.0, LARGEST_STEP_PX / max(length, 1e-12))
         at_x, at_y = at_x + float(step[0]), at_y + float(step[1])
-        if length < SETTLED_PX:
+        if is_near and length < SETTLED_PX:
             break
     else:
         raise NoSymmetryError("the search does not converge")
-    return _judged(window(), window(turned=True), (at_x, at_y), (normal, difference), half_px, shared_pixels)
+    solved = (normal, (weight**2 * odd) @ odd.T, float(weight.sum()), difference)
+    return _judged(window(), window(turned=True), (at_x, at_y), solved, half_px, shared_pixels)
+
+
+def _variance(difference: Doubles, at: tuple[float, float]) -> float:
+    """Variance of the noise: the difference is antisymmetric, so that only half of its pixels are independent."""
+    phases = interpolated_power(at[0]) * interpolated_power(at[1])
+    return max(float(np.mean(difference**2)) / 2.0 / phases * difference.size / (difference.size - 8), ROUNDING)
+
+
+def _noisy(difference: Doubles, at: tuple[float, float]) -> float:
+    """Variance of a component of the gradients, of one pixel."""
+    phases = interpolated_power(at[0]) * interpolated_power(at[1])
+    return 2.0 * _variance(difference, at) * phases * DIFFERENCE_POWER
+
+
+def _weights(odd: Doubles, difference: Doubles, ring: Indices, at: tuple[float, float]) -> Doubles:
+    """Weight of every pixel: the share of its ring's mean squared gradient that is not noise (Wiener's filter).
+
+    Gradients of flat ground are noise alone; unweighted, they would let the noise of the ground move the centre.
+    """
+    power = np.bincount(ring, (odd**2).sum(axis=0)) / np.maximum(np.bincount(ring), 1)
+    share = 1.0 - 2.0 * _noisy(difference, at) / np.maximum(power, 1e-30)
+    return np.asarray(np.maximum(share, 0.0)[ring])
 
 
 def _judged(
     seen: Floats,
     turned: Floats,
     at: tuple[float, float],
-    solved: tuple[Doubles, Doubles],
+    solved: tuple[Doubles, Doubles, float, Doubles],
     half_px: int,
     shared_pixels: float,
 ) -> Symmetric:
-    normal, difference = solved
+    normal, squared, weights, difference = solved
     inner = (slice(RIM, -RIM), slice(RIM, -RIM))
     y, x = np.mgrid[-half_px : half_px + 1, -half_px : half_px + 1]
     # The corners of a square window are not compared, only the disc inside it.
@@ -135,10 +165,8 @@ def _judged(
     ring = np.rint(np.hypot(x, y)[disc]).astype(np.intp)
     mean = (np.bincount(ring, levels) / np.maximum(np.bincount(ring), 1))[ring]
     power = max(float(levels @ levels), 1e-12)
-    phases = interpolated_power(at[0]) * interpolated_power(at[1])
-    # The difference is antisymmetric about the centre, so that only half of the pixels are independent.
-    variance = max(float(np.mean(difference**2)) / 2.0 / phases * difference.size / (difference.size - 8), ROUNDING)
-    noisy = np.eye(2) * 2.0 * variance * phases * DIFFERENCE_POWER * difference.size
+    variance = _variance(difference, at)
+    noisy = np.eye(2) * _noisy(difference, at) * weights
     true = normal - noisy
     size = np.sqrt(np.maximum(np.diag(normal), 1e-30))
     covariance = np.diag([np.inf, np.inf])
@@ -146,7 +174,7 @@ def _judged(
         own = np.linalg.inv(true)
         # `normal` is a sum over all pixels, which counts each pair twice with (2 g)^2, g being the gradient; the noise
         # variance of a pair's difference is 2 sigma^2.
-        covariance = 4.0 * variance * shared_pixels * own @ normal @ own
+        covariance = 4.0 * variance * shared_pixels * own @ squared @ own
     return Symmetric(
         at[0], at[1], covariance, float(levels @ reflected) / power,
         float(levels @ quarter) / max(float(np.sqrt(power * (quarter @ quarter))), 1e-12),
