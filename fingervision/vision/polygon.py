@@ -35,13 +35,12 @@ class Side(NamedTuple):
 
 
 class ReadOff(NamedTuple):
-    """Result for a chain of sides: tip, inner edge, slope of the edge, and the sides that determine tip and edge."""
+    """Result for a chain of sides: height of the tip, its position across, inner edge, and slope of the edge."""
 
     tip: float
     apex: float
     edge: float
     slope: float
-    on: frozenset[int]
 
 
 class Corner(NamedTuple):
@@ -89,34 +88,34 @@ class Polygon(NamedTuple):
         tip = self._tip(ends)
         if tip is None:
             return None
-        height, apex, top, first = tip
+        height, apex, first = tip
         edge = self._edge(ends, height + below_tip_px, first)
-        return None if edge is None else ReadOff(height, apex, edge[0], edge[1], frozenset((*top, *edge[2])))
+        return None if edge is None else ReadOff(height, apex, *edge)
 
-    def _tip(self, ends: "_Ends") -> tuple[float, float, tuple[int, ...], int] | None:
-        """Height of the tip, its position across, the sides that form it, and the side where the inner edge begins."""
+    def _tip(self, ends: "_Ends") -> tuple[float, float, int] | None:
+        """Height of the tip, its position across, and the side where the inner edge begins."""
         if self.level is not None:
             (x0, y0), (x1, y1) = ends.first[self.level], ends.last[self.level]
-            return 0.5 * (y0 + y1), 0.5 * (x0 + x1), (self.level,), self.level
+            return 0.5 * (y0 + y1), 0.5 * (x0 + x1), self.level
         for k, (one, two) in enumerate(zip(self.sides, self.sides[1:], strict=False)):
             if sin(one.angle) <= 0.0 < sin(two.angle):
                 x, y = ends.centres[k]
-                return y - self.radii[k], x, (k, k + 1), k
+                return y - self.radii[k], x, k
         return None
 
-    def _edge(self, ends: "_Ends", height: float, first: int) -> tuple[float, float, tuple[int, ...]] | None:
-        """Position and slope of the inner side at a height, and the sides that determine it."""
+    def _edge(self, ends: "_Ends", height: float, first: int) -> tuple[float, float] | None:
+        """Position and slope of the inner side at a height."""
         for k in range(first, len(self.sides)):
             side, (_, y0), (_, y1) = self.sides[k], ends.first[k], ends.last[k]
             rise = sin(side.angle)
             if rise > 0.0 and y0 <= height <= y1:
                 slope = cos(side.angle) / rise
-                return side.x + slope * (height - side.y), slope, (k,)
+                return side.x + slope * (height - side.y), slope
             if k < len(self.radii) and y1 < height < ends.first[k + 1][1]:
                 x, y = ends.centres[k]
                 up = height - y
                 wide = sqrt(max(self.radii[k] ** 2 - up**2, 1e-12))
-                return x + wide, -up / wide, (k, k + 1)
+                return x + wide, -up / wide
         return None
 
 
