@@ -119,11 +119,15 @@ how_to_read_pictures = together(
         "--bits", type=click.IntRange(8, 16), group=MEASURED,
         help="True bit depth of grey levels that are stored in 16 bits, if it is less than 16.",
     ),
-    option(
-        "--fingers", type=click.Choice(["auto", "dark", "light"]), default="auto", show_default=True, group=MEASURED,
-        help="Whether the fingers are darker or lighter than the background.",
-    ),
 )  # fmt: skip
+
+
+def fingers_option(*more: str, words: str = "", **default: Any) -> Callable[[Function], Function]:
+    """Make the option of the fingers' brightness, with further choices and words about them."""
+    return option(
+        "--fingers", type=click.Choice(["auto", "dark", "light", *more]), group=MEASURED, **default,
+        help=f"Whether the fingers are darker or lighter than the background{words}.",
+    )  # fmt: skip
 
 
 def where_to_measure(command: Function) -> Function:

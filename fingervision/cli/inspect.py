@@ -8,6 +8,7 @@ import click
 from fingervision.cli._command import MEASURED, NUMBER, OUTPUT, make_command, option
 from fingervision.cli._options import (
     figure_option,
+    fingers_option,
     how_to_read_pictures,
     json_option,
     rate_option,
@@ -33,6 +34,7 @@ Exit codes: 0 done, whatever was found; 1 no frame could be measured, and the re
 @click.argument("source")
 @where_to_measure
 @how_to_read_pictures
+@fingers_option(default="auto", show_default=True)
 @option(
     "--seconds",
     type=NUMBER,

@@ -10,6 +10,7 @@ from fingervision.cli._command import FILE, MEASURED, OUTPUT, complain, make_com
 from fingervision.cli._options import (
     columns_option,
     drive_options,
+    fingers_option,
     how_to_read_pictures,
     json_option,
     out_option,
@@ -20,6 +21,8 @@ from fingervision.cli._options import (
 from fingervision.domain.errors import FingervisionError, UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from fingervision.measuring.body_poses import FollowedBodies
     from fingervision.measuring.drawing_placement import GivenPoint
     from fingervision.measuring.measure import Measured
@@ -43,11 +46,12 @@ Examples:
 Files written to --out:
   gaps.csv      one row per frame: gap with its uncertainty, points, tips, or why there is no value
   summary.json  counts, statistics, settings, scale, what the uncertainty includes and what not
-  gap.png       the gap over time
+  gap.png       the gap over time; not with gauges that ask for no gap (see --fingers)
   drive_log.csv with --drive: the stage's log on the recording's clock, which diagnose reads
   bodies.csv    with --mechanism: pose and status of every body and hinge, frame by frame
   flexures.csv  with --mechanism: thickness and place of every flexure at rest
   gauges.csv    with --gauges: one row per value, time_s,gauge,quantity,value,u,unit,status
+  gauges.png    with --gauges: each quantity over time, with its expanded uncertainty
   overlay.mp4   with --overlay: video with edges, tips, points and value drawn in
   steps/        with --steps: a picture of every processing step
 
@@ -61,6 +65,12 @@ Exit codes: 0 done; 1 failed, or fewer than one frame in ten shows fingers; 2 wr
 @click.argument("recording")
 @where_to_measure
 @how_to_read_pictures
+@fingers_option(
+    "none",
+    words="; none measures no gap",
+    show_default="auto; none with --gauges without a gap, unless --tips, --roi, --face, --drive, --steps or "
+    "--mechanism is given",
+)
 @option(
     "--face",
     type=click.Choice(["front", "outline"]),
@@ -79,7 +89,7 @@ Exit codes: 0 done; 1 failed, or fewer than one frame in ten shows fingers; 2 wr
     "--gauges",
     type=FILE,
     group=MEASURED,
-    help="Also measure user-defined gauges (gauges.toml): edges, lines, circles, marks, patches.",
+    help="Measure user-defined gauges (gauges.toml): edges, lines, circles, marks, patches; see --fingers.",
 )
 @option(
     "--mechanism",
@@ -135,7 +145,8 @@ def command(
     """Measure the gap between two fingers in RECORDING: a video file, a folder of images, or a glob in quotes.
 
     The gap is the distance between the fingers' inner edges, 0.3 mm below their tips, in every frame, with its standard
-    uncertainty. One of --calibration and --px-per-mm is required.
+    uncertainty. One of --calibration and --px-per-mm is required. With --gauges, gauges are measured, and the gap only
+    if it is asked for: by a gauge of the kind gap, or by an option about the fingers.
     """
     from fingervision.interface.measure import measure_into
     from fingervision.interface.measuring_task import measuring_task, scale_of
@@ -145,6 +156,8 @@ def command(
             "--at states where the drawing of a mechanism lies in the picture, but no drawing is given: add "
             "--mechanism FILE, or leave --at out."
         )
+    if mechanism is not None:
+        options["fingers"] = options["fingers"] or "auto"
     task = measuring_task(
         scale=scale_of(calibration, px_per_mm, u_px_per_mm), roi=region_from(roi), frames=_frames(frames), **options
     )
@@ -257,6 +270,8 @@ def _report(measured: "Measured", as_json: bool) -> None:
         )
     elif not series.frames:
         _complain(f"{summary['recording']['name']} must have at least one picture, but has none: record it again.")
+    elif summary["settings"]["fingers"] == "none" and not measured.has_gauge_numbers:
+        _complain(f"No gauge has a value in any of the {series.frames} frames{_why_none(summary)}")
     elif not series.counts[Status.OK] and not measured.has_gauge_numbers:
         first = min(series.first_without.values(), key=lambda bad: bad.frame)
         _complain(
@@ -279,16 +294,25 @@ def _report(measured: "Measured", as_json: bool) -> None:
         )
 
 
+def _why_none(summary: "Mapping[str, Any]") -> str:
+    """End of a sentence with the reason of the first gauge that has no value."""
+    from fingervision.gauges.reading import MEANING
+
+    for name, gauge in summary.get("gauges", {}).items():
+        for status, why in gauge["why"].items():
+            words = why["words"] or MEANING.get(status, "")
+            return f": {name} is {status} in frame {why['first_frame']}: {words or 'see gaps.csv'}"
+    return "; no gauges are given: add --gauges FILE."
+
+
 def _print_result(measured: "Measured") -> None:
-    from fingervision.gauges.recording import gauge_sentence
     from fingervision.measuring.words import result_sentences
 
     for sentence in result_sentences(measured.summary, measured.series):
         click.echo(sentence)
-    for name, gauge in measured.summary.get("gauges", {}).items():
-        click.echo(gauge_sentence(name, gauge))
     folder = measured.folder
-    files = [folder.gaps, folder.gauges, folder.drive_log, folder.summary, folder.figure, folder.overlay, folder.steps]
+    tables, figures = (folder.gaps, folder.gauges, folder.drive_log), (folder.figure, folder.gauge_figure)
+    files = [*tables, folder.summary, *figures, folder.overlay, folder.steps]
     click.echo("Written: " + ", ".join(str(file) for file in files if file.exists()))
 
 

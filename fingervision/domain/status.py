@@ -17,6 +17,7 @@ class Status(StrEnum):
     OK = "ok"
     DAMAGED = "damaged"
     DUPLICATE = "duplicate"
+    NOT_ASKED = "not_asked"
     SATURATED = "saturated"
     LOW_CONTRAST = "low_contrast"
     NO_FINGERS = "no_fingers"

@@ -56,6 +56,11 @@ class Gauge:
         """Name of each of the gauge's quantities, and whether it is a length or an angle."""
         return self.kind.QUANTITIES
 
+    @property
+    def asks_for_fingers(self) -> bool:
+        """Whether the gauge measures the gap between fingers."""
+        return getattr(self.kind, "ASKS_FOR_FINGERS", False)
+
 
 def read_gauges(path: Path) -> tuple[Gauge, ...]:
     """Read a file of gauges.

@@ -1,8 +1,11 @@
 """All gauges of one recording: measure them frame by frame, convert them to rows, count and draw them."""
 
+from array import array
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
+from math import nan
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -87,24 +90,54 @@ def _name(canvas: Canvas, gauge: Gauge, reading: Reading, colour: tuple[int, int
 FRAMES_AT_ONCE = 64
 
 
+def _numbers() -> "array[float]":
+    return array("d")
+
+
+@dataclass(slots=True)
+class Course:
+    """A quantity over time, in few bytes per frame; NaN, in memory only, where a frame has no time.
+
+    Parameters
+    ----------
+    unit : str
+        Unit of the values.
+    frame, time_s, value, u : array of float
+        Number and time of each frame with a value, the value, and its standard uncertainty.
+    """
+
+    unit: str
+    frame: "array[float]" = field(default_factory=_numbers)
+    time_s: "array[float]" = field(default_factory=_numbers)
+    value: "array[float]" = field(default_factory=_numbers)
+    u: "array[float]" = field(default_factory=_numbers)
+
+    def add(self, frame: int, time_s: float | None, value: float = 0.0, u: float = 0.0) -> None:
+        """Add the next frame."""
+        for column, cell in zip((self.frame, self.time_s, self.value, self.u), (frame, time_s, value, u), strict=True):
+            column.append(nan if cell is None else cell)
+
+
 @dataclass(slots=True)
 class Tally:
-    """Summary of one gauge over the frames of a recording.
+    """Course of one gauge over the frames of a recording.
 
     Parameters
     ----------
     counts : Counter of str
         Number of frames with each status.
-    words : dict of str to str
-        Sentence of the first frame with each status, if it has one.
-    least, most : dict of str to float
-        Smallest and largest value of each quantity.
+    first : dict of str to (int, str)
+        Number of the first frame with each status, and its sentence, if it has one.
+    courses : dict of str to Course
+        Each quantity over time.
+    without : Course
+        Frames without a value.
     """
 
     counts: Counter[str] = field(default_factory=Counter)
     first: dict[str, tuple[int, str]] = field(default_factory=dict)
-    least: dict[str, Cell] = field(default_factory=dict)
-    most: dict[str, Cell] = field(default_factory=dict)
+    courses: dict[str, Course] = field(default_factory=dict)
+    without: Course = field(default_factory=lambda: Course(""))
 
 
 class GaugeRecording:
@@ -211,15 +244,14 @@ class GaugeRecording:
                 tally, status = self.tallies[gauge.name], reading.status.value
                 tally.counts[status] += 1
                 tally.first.setdefault(status, (index, reading.words))
-                for number, (name, sort) in enumerate(gauge.quantities):
-                    if number < len(reading.quantities):
-                        cell = next(cells)
-                        tally.least[name] = min(tally.least.get(name, cell), cell)
-                        tally.most[name] = max(tally.most.get(name, cell), cell)
-                        rows.append(GaugeRow(time_s, gauge.name, name, *cell, status))
-                    else:
-                        unit = length if sort == "length" else "mrad"
-                        rows.append(GaugeRow(time_s, gauge.name, name, None, None, unit, status))
+                if not reading.quantities:
+                    tally.without.add(index, time_s)
+                own = gauge_rows(gauge, time_s, status, list(islice(cells, len(reading.quantities))), length)
+                rows += own
+                for row in own:
+                    if row.value is not None and row.u is not None:
+                        course = tally.courses.setdefault(row.quantity, Course(row.unit))
+                        course.add(index, time_s, row.value, row.u)
         self._table.add(rows)
 
     def in_words(self) -> dict[str, Any]:
@@ -234,17 +266,25 @@ class GaugeRecording:
                     if status != GaugeStatus.OK.value
                 },
                 "quantities": {
-                    name: {
-                        "least": self.tallies[gauge.name].least[name].value,
-                        "greatest": self.tallies[gauge.name].most[name].value,
-                        "unit": self.tallies[gauge.name].least[name].unit,
-                    }
-                    for name, _ in gauge.quantities
-                    if name in self.tallies[gauge.name].least
+                    name: {"least": min(course.value), "greatest": max(course.value), "unit": course.unit}
+                    for name, course in self.tallies[gauge.name].courses.items()
                 },
             }
             for gauge in self._gauges
         }
+
+
+def gauge_rows(
+    gauge: Gauge, time_s: float | None, status: str, cells: Sequence[Cell], length_unit: str
+) -> list[GaugeRow]:
+    """Rows of one gauge in one frame: one for each quantity, without values where there are no cells."""
+    units = {"length": length_unit, "angle": "mrad"}
+    none = (None,) * len(gauge.quantities)
+    values, u = [*(cell.value for cell in cells), *none], [*(cell.u for cell in cells), *none]
+    return [
+        GaugeRow(time_s, gauge.name, name, values[k], u[k], units[sort], status)
+        for k, (name, sort) in enumerate(gauge.quantities)
+    ]
 
 
 def cells_of(quantities: Sequence[Any], plane: PlaneScale | None) -> list[Cell]:
@@ -260,15 +300,3 @@ def cells_of(quantities: Sequence[Any], plane: PlaneScale | None) -> list[Cell]:
         found.append(quantity.on_plane(own, plane))
         first += len(some)
     return found
-
-
-def gauge_sentence(name: str, gauge: Mapping[str, Any]) -> str:
-    """Sentence about one gauge, from its entry in summary.json."""
-    frames = sum(gauge["counts"].values())
-    ranges = [
-        f"{quantity} {found['least']:.4f} to {found['greatest']:.4f} {found['unit']}"
-        for quantity, found in gauge["quantities"].items()
-    ]
-    why = [f"{gauge['counts'][status]} {status}" for status in gauge["why"]]
-    words = "; ".join([*ranges, *why])
-    return f"Gauge {name} ({gauge['kind']}): {gauge['counts'].get('ok', 0)} of {frames} frames; {words}."

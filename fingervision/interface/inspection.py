@@ -15,7 +15,7 @@ from fingervision.inspection.finding import Finding
 from fingervision.inspection.frames_to_look_at import frames_to_look_at
 from fingervision.inspection.report import as_json, as_text
 from fingervision.inspection.sample import Sample, take_sample
-from fingervision.interface.argument_checks import number, path_of, region_of, speaks_python
+from fingervision.interface.argument_checks import number, one_of, path_of, region_of, speaks_python
 from fingervision.interface.frame_sources import recording_of
 from fingervision.interface.measuring_task import measuring_task, scale_of
 from fingervision.measuring.task import task_for_frames
@@ -159,7 +159,7 @@ def inspect(
             roi=region_of(roi),
             response=response,
             bits=bits,
-            fingers=fingers,
+            fingers=one_of("fingers", fingers, ("auto", "dark", "light")),
         )
         description = opened.description
         task = task_for_frames(task, description)

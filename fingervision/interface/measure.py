@@ -51,7 +51,7 @@ def measure(
     columns: "str | os.PathLike[str] | None" = None,
     response: "str | os.PathLike[str] | CameraResponse" = "auto",
     bits: int | None = None,
-    fingers: str = "auto",
+    fingers: str | None = None,
     face: str = "front",
     coding: str = "lossless",
     frames: int | tuple[int, int] | None = None,
@@ -99,8 +99,9 @@ def measure(
         Light that each grey level stands for: auto, linear, srgb, bt709 or a file.
     bits : int or None
         True bit depth of levels that are stored in 16 bits, if it is not 16.
-    fingers : str
-        Whether the fingers are darker or lighter than the background: auto, dark or light.
+    fingers : str or None
+        Whether the fingers are darker or lighter than the background: auto, dark or light; none measures no gap. By
+        default auto, and none for gauges of which no one is a `gap`, unless `tips`, `roi`, `face` or `drive` is stated.
     face : str
         Edge of a thick part: front, of the face towards the camera, or outline.
     coding : str

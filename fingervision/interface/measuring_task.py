@@ -16,12 +16,11 @@ from fingervision.frames.array_levels import what_it_is
 from fingervision.gauges.gauge_file import Gauge, read_gauges
 from fingervision.interface.argument_checks import number, one_of, whole_number
 from fingervision.measuring.scale import Scale, check_one_scale, stated_scale
-from fingervision.measuring.task import Task
+from fingervision.measuring.task import FINGERS, NO_FINGERS, Task
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.response_csv import response_named
 
 TIPS = ("auto", *(direction.value for direction in Direction))
-FINGERS = {"auto": None, "dark": True, "light": False}
 FACES = ("front", "outline")
 BITS = (8, 16)
 
@@ -76,7 +75,7 @@ def measuring_task(
     columns: Path | None = None,
     response: Any = "auto",
     bits: int | None = None,
-    fingers: str = "auto",
+    fingers: str | None = None,
     face: str = "front",
     overlay: bool = False,
     steps_frame: int | None = None,
@@ -102,6 +101,16 @@ def measuring_task(
             raise UsageError(f"--bits must be {BITS[0]} to {BITS[1]}, but is {depth}.")
     if not isinstance(response, str | os.PathLike | CameraResponse):
         raise ArgumentTypeError("response", "be a word or the name of a file", f"is {what_it_is(response)}")
+    drawn = _gauges(gauges)
+    if fingers is None:
+        described = drive is not None or roi is not None or steps_frame is not None or (tips, face) != ("auto", "front")
+        is_asked = described or not drawn or any(gauge.asks_for_fingers for gauge in drawn)
+        fingers = "auto" if is_asked else NO_FINGERS
+    elif fingers == NO_FINGERS and drive is not None:
+        raise UsageError(
+            "--drive needs the gap between fingers, from whose motion the clock offset is found, but --fingers is "
+            "none: leave one of them out."
+        )
     log, rests = (None, 0) if drive is None else _drive(drive, columns)
     return Task(
         scale=scale[0],
@@ -116,10 +125,10 @@ def measuring_task(
         steps_frame=steps_frame,
         response=response if isinstance(response, CameraResponse) else response_named(os.fspath(response)),
         bits=depth,
-        fingers_are_dark=FINGERS[one_of("fingers", fingers, FINGERS)],
+        fingers=one_of("fingers", fingers, FINGERS),
         is_outline=one_of("face", face, FACES) == "outline",
         frames=frames,
-        gauges=_gauges(gauges),
+        gauges=drawn,
     )
 
 

@@ -13,10 +13,8 @@ from fingervision.frames.source import Description
 from fingervision.measuring.scale import Scale, scale_for_frames
 from fingervision.measuring.task import Task
 
-MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers_are_dark"})
+MOVES_ZERO = frozenset({"scale", "below_tip_mm", "direction", "region", "fingers"})
 """Settings whose change invalidates the zero."""
-FINGERS = {"auto": None, "dark": True, "light": False}
-"""Whether the fingers are dark, by the name that settings files and the page give it; None: found in every frame."""
 ZERO_IS_OFF = "The zero was removed, because it was set with another scale, height, region or direction of the tips."
 
 
@@ -36,8 +34,8 @@ class Choices:
         Direction in which the tips point; None for automatic detection.
     region : Region or None
         Region of interest; None for the complete frame.
-    fingers_are_dark : bool or None
-        Whether the fingers are darker than the background; None for automatic detection.
+    fingers : str
+        Brightness of the fingers (`measuring.task.FINGERS`): auto for automatic detection, none if no gap is asked for.
     zero_mm : float
         Value subtracted from the displayed gap; files contain the gap without this subtraction.
     least_mm, greatest_mm : float or None
@@ -49,7 +47,7 @@ class Choices:
     below_tip_mm: float = 0.3
     direction: Direction | None = None
     region: Region | None = None
-    fingers_are_dark: bool | None = None
+    fingers: str = "auto"
     zero_mm: float = 0.0
     least_mm: float | None = None
     greatest_mm: float | None = None
@@ -67,11 +65,6 @@ class Choices:
         return chosen, bool(self.zero_mm) and chosen.zero_mm == 0.0 and moves_zero
 
     @property
-    def fingers(self) -> str:
-        """Name of the brightness of the fingers, one of `FINGERS`."""
-        return next(name for name, are_dark in FINGERS.items() if are_dark is self.fingers_are_dark)
-
-    @property
     def task(self) -> Task | None:
         """Return the settings of the measurement; None until the scale is known."""
         if self.scale is None:
@@ -82,7 +75,7 @@ class Choices:
             self.below_tip_mm,
             self.direction,
             self.region,
-            fingers_are_dark=self.fingers_are_dark,
+            fingers=self.fingers,
         )
 
     def for_frames(self, description: Description) -> "Choices":

@@ -198,7 +198,7 @@ def _about(description: Description, task: Task, began: datetime) -> dict[str, A
         "settings": {
             "below_tip_mm": task.below_tip_mm,
             "tips": "auto" if task.direction is None else task.direction.value,
-            "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
+            "fingers": task.fingers,
             "roi": None if region is None else list(asdict(region).values()),
         },
         "scale": {

@@ -1,5 +1,6 @@
 """Plot of the gap over time with its uncertainty."""
 
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from fingervision.domain.drive import DriveHistory
 from fingervision.domain.errors import OutputError
-from fingervision.domain.status import Status
 from fingervision.measuring.series import GapSeries
 from fingervision.motion.clock.clock_offset import ClockOffset
 from fingervision.storage.durable import replaced
@@ -37,7 +37,17 @@ def draw_gap(
     OutputError
         If the picture cannot be written.
     """
-    figure = gap_figure(series, drive, clock)
+    write_figure(path, gap_figure(series, drive, clock))
+
+
+def write_figure(path: Path, figure: Figure) -> None:
+    """Write a figure into a picture file.
+
+    Raises
+    ------
+    OutputError
+        If the picture cannot be written.
+    """
     try:
         with replaced(path) as part:
             figure.savefig(part, dpi=DOTS_PER_INCH, format="png")
@@ -71,37 +81,71 @@ def draw_gap_axes(
 ) -> None:
     """Plot the gap into the upper axes, and its expanded uncertainty into the lower axes; see `gap_figure`."""
     where, where_not, label = _axis(series)
-    pieces = _pieces(series)
-    gap_mm, expanded_um = series.gap_mm, COVERAGE_FACTOR * 1e3 * series.u_mm
-    if gap_mm.size:
-        for number, piece in enumerate(pieces):
-            _line(upper, where[piece], gap_mm[piece], expanded_um[piece] * 1e-3, series, named=number == 0)
-            lower.plot(*_thinned(where[piece], expanded_um[piece]), ".-", color=GAP_COLOUR, linewidth=0.8, markersize=1)
-        upper.legend(loc="best", framealpha=0.8, fontsize="small")
-    else:
-        upper.text(0.5, 0.5, "no frame has a gap", ha="center", va="center", transform=upper.transAxes)
-    if where_not.size:
-        marks = where_not[:: max(1, where_not.size // MOST_POINTS)]
-        upper.plot(
+    frames, expanded_mm = series.frame_numbers()[0], COVERAGE_FACTOR * series.u_mm
+    band = "U = 2 u" if series.has_budget else "U = 2 u (from frame to frame)"
+    curve = Curve(where, frames, series.gap_mm, expanded_mm, where_not, _reasons(series))
+    draw_curve(upper, curve, "gap", band)
+    for piece in _pieces(frames):
+        lower.plot(
+            *_thinned(where[piece], 1e3 * expanded_mm[piece]), ".-", color=GAP_COLOUR, linewidth=0.8, markersize=1
+        )
+    if drive is not None and clock is not None and series.times_s() is not None:
+        _draw_input(upper, drive, clock)
+    upper.set_ylabel("gap (mm)")
+    lower.set_ylabel("U, k = 2 (µm)")
+    lower.set_ylim(0.0, 1.15e3 * float(expanded_mm.max()) if frames.size else 1.0)
+    lower.set_xlabel(label)
+    lower.grid(visible=True, alpha=0.3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A quantity over time.
+
+    Parameters
+    ----------
+    where : ndarray, shape (n,)
+        Times (s), or numbers, of the frames with a value.
+    frames : ndarray of int, shape (n,)
+        Numbers of the frames with a value.
+    value, expanded : ndarray, shape (n,)
+        Values, and their expanded uncertainties.
+    where_not : ndarray, shape (m,)
+        Times (s), or numbers, of the frames without a value.
+    reasons : str
+        Why these frames have none.
+    """
+
+    where: Floats
+    frames: NDArray[np.int64]
+    value: Floats
+    expanded: Floats
+    where_not: Floats
+    reasons: str
+
+
+def draw_curve(axes: Axes, curve: Curve, name: str, band: str) -> None:
+    """Plot a quantity with the band of its expanded uncertainty, and mark frames without a value at the lower edge."""
+    for number, piece in enumerate(_pieces(curve.frames)):
+        _line(axes, curve, piece, (name, band) if number == 0 else (None, None))
+    if not curve.value.size:
+        axes.text(0.5, 0.5, f"no frame has a value of {name}", ha="center", va="center", transform=axes.transAxes)
+    if curve.where_not.size:
+        marks = curve.where_not[:: max(1, curve.where_not.size // MOST_POINTS)]
+        axes.plot(
             marks,
             np.full(marks.size, 0.02),
             "x",
             color=FAILURE_COLOUR,
             markersize=5,
-            transform=upper.get_xaxis_transform(),
-            label=f"no number: {_reasons(series)}",
+            transform=axes.get_xaxis_transform(),
+            label=f"no number: {curve.reasons}",
             clip_on=False,
         )
-        upper.legend(loc="best", framealpha=0.8, fontsize="small")
-    if drive is not None and clock is not None and series.times_s() is not None:
-        _draw_input(upper, drive, clock)
-    upper.set_ylabel("gap (mm)")
-    lower.set_ylabel("U, k = 2 (µm)")
-    lower.set_ylim(0.0, 1.15 * float(expanded_um.max()) if gap_mm.size else 1.0)
-    lower.set_xlabel(label)
-    for axes in (upper, lower):
-        axes.grid(visible=True, alpha=0.3)
-        axes.ticklabel_format(useOffset=False)
+    if curve.value.size or curve.where_not.size:
+        axes.legend(loc="best", framealpha=0.8, fontsize="small")
+    axes.grid(visible=True, alpha=0.3)
+    axes.ticklabel_format(useOffset=False)
 
 
 def _draw_input(axes: Axes, drive: DriveHistory, clock: ClockOffset | float) -> None:
@@ -129,9 +173,8 @@ def _axis(series: GapSeries) -> tuple[Floats, Floats, str]:
     return frames.astype(np.float64), frames_without.astype(np.float64), "frame"
 
 
-def _pieces(series: GapSeries) -> list[slice]:
-    """Stretches of successive frames with a gap, because no line is drawn across missing frames."""
-    frames, _ = series.frame_numbers()
+def _pieces(frames: NDArray[np.int64]) -> list[slice]:
+    """Stretches of successive frames with a value, because no line is drawn across missing frames."""
     if not frames.size:
         return []
     ends = [0, *(np.flatnonzero(np.diff(frames) > 1) + 1).tolist(), frames.size]
@@ -140,20 +183,19 @@ def _pieces(series: GapSeries) -> list[slice]:
     return [slice(start, end) for start, end in pairwise(ends)]
 
 
-def _line(axes: Axes, where: Floats, gap_mm: Floats, expanded_mm: Floats, series: GapSeries, *, named: bool) -> None:
-    """Plot one stretch of frames; only the first stretch is named in the legend."""
-    band_words = "U = 2 u" if series.has_budget else "U = 2 u (from frame to frame)"
-    gap_label, band_label = ("gap", band_words) if named else (None, None)
-    low, high = gap_mm - expanded_mm, gap_mm + expanded_mm
-    if gap_mm.size <= MOST_POINTS:
-        mark = ".-" if series.counts[Status.OK] <= 60 or gap_mm.size == 1 else "-"
-        axes.fill_between(where, low, high, color=BAND_COLOUR, linewidth=0, label=band_label)
-        axes.plot(where, gap_mm, mark, color=GAP_COLOUR, linewidth=1.0, markersize=4, label=gap_label)
+def _line(axes: Axes, curve: Curve, piece: slice, names: tuple[str | None, str | None]) -> None:
+    """Plot one stretch of frames, with the names of line and band in the legend."""
+    where, value, expanded = curve.where[piece], curve.value[piece], curve.expanded[piece]
+    low, high = value - expanded, value + expanded
+    if value.size <= MOST_POINTS:
+        mark = ".-" if curve.value.size <= 60 or value.size == 1 else "-"
+        axes.fill_between(where, low, high, color=BAND_COLOUR, linewidth=0, label=names[1])
+        axes.plot(where, value, mark, color=GAP_COLOUR, linewidth=1.0, markersize=4, label=names[0])
         return
-    starts = _starts(gap_mm.size)
+    starts = _starts(value.size)
     for lowest, highest, colour, label in (
-        (low, high, BAND_COLOUR, band_label),
-        (gap_mm, gap_mm, GAP_COLOUR, gap_label),
+        (low, high, BAND_COLOUR, names[1]),
+        (value, value, GAP_COLOUR, names[0]),
     ):
         axes.fill_between(
             where[starts],

@@ -1,6 +1,6 @@
 """Measure a recording in memory: every row and result is kept, and no file is written."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -8,7 +8,7 @@ from typing import Any
 from fingervision.domain.errors import DataError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.source import FrameSource
-from fingervision.gauges.recording import GaugeRecording
+from fingervision.gauges.recording import GaugeRecording, Tally
 from fingervision.measuring.frame_loop import Prepared, Progress, measure_frames, prepared
 from fingervision.measuring.outcome import Clock, clock_for, summary_of, undriven
 from fingervision.measuring.rows import Result
@@ -50,6 +50,8 @@ class MeasuredInMemory:
         Reason why the drive gave no frame an input; None if it did, or there is no drive.
     gauge_rows : tuple of GaugeRow
         Results of the gauges, as in gauges.csv.
+    tallies : mapping of str to Tally
+        Each gauge over time, by its name.
     """
 
     source: FrameSource
@@ -64,6 +66,7 @@ class MeasuredInMemory:
     stopped: bool = False
     refusal: DataError | None = None
     gauge_rows: tuple[GaugeRow, ...] = field(default=(), repr=False)
+    tallies: Mapping[str, Tally] = field(default_factory=dict, repr=False)
 
 
 def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | None = None) -> MeasuredInMemory:
@@ -135,6 +138,7 @@ def measure_in_memory(source: FrameSource, task: Task, on_progress: Progress | N
         stopped,
         refusal,
         tuple(gauge_rows),
+        {} if gauges is None else gauges.tallies,
     )
 
 

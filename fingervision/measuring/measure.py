@@ -14,6 +14,7 @@ from fingervision.gauges.recording import GaugeRecording
 from fingervision.measuring.drive_clock import join_drive
 from fingervision.measuring.frame_loop import Progress, measure_frames, prepared
 from fingervision.measuring.gap_figure import draw_gap
+from fingervision.measuring.gauge_figure import draw_gauges
 from fingervision.measuring.outcome import clock_drawn, clock_for, log_on_the_recording, summary_of, undriven
 from fingervision.measuring.output_folder import OutputFolder, claimed, held
 from fingervision.measuring.overlay_video import OverlayVideo
@@ -140,10 +141,12 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         join_drive(folder.gaps, task.drive, clock)
     if (log := log_on_the_recording(clock, task)) is not None:
         write_drive_log(folder.drive_log, log)
-    draw_gap(folder.figure, series, task.drive, clock_drawn(clock, task))
+    if task.has_fingers:
+        draw_gap(folder.figure, series, task.drive, clock_drawn(clock, task))
     summary = summary_of(how, task, series, clock, complete=not stopped)
     if gauges is not None:
         summary["gauges"] = gauges.in_words()
+        draw_gauges(folder.gauge_figure, gauges.tallies)
     write_summary(folder.summary, summary)
     if not stopped and (refusal := undriven(task, series, clock, driven, f"in {folder.gaps}")) is not None:
         raise refusal

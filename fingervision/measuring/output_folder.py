@@ -12,6 +12,7 @@ from fingervision.frames.frame_range import frame_range
 from fingervision.frames.source import FrameSource
 from fingervision.gauges.recording import GaugeRecording
 from fingervision.measuring.gap_figure import draw_gap
+from fingervision.measuring.gauge_figure import draw_gauges
 from fingervision.measuring.in_memory import MeasuredInMemory
 from fingervision.measuring.marked import marked
 from fingervision.measuring.outcome import clock_drawn, log_on_the_recording
@@ -25,7 +26,7 @@ from fingervision.storage.run_files import lost_frames
 from fingervision.storage.summary_json import recording_of, refuse_other_recording, write_summary
 
 GAPS, SUMMARY, FIGURE, OVERLAY, STEPS = "gaps.csv", "summary.json", "gap.png", "overlay.mp4", "steps"
-GAUGES = "gauges.csv"
+GAUGES, GAUGE_FIGURE = "gauges.csv", "gauges.png"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +44,11 @@ class OutputFolder:
     def gauges(self) -> Path:
         """Path of the table of the gauges."""
         return self.path / GAUGES
+
+    @property
+    def gauge_figure(self) -> Path:
+        """Path of the figure of the gauges over time."""
+        return self.path / GAUGE_FIGURE
 
     @property
     def drive_log(self) -> Path:
@@ -87,7 +93,7 @@ def claimed(path: Path, recording_files: tuple[Path, ...]) -> OutputFolder:
     UsageError
         The folder is where the recording's images are, or the recording would be replaced.
     """
-    names = (GAPS, GAUGES, DRIVE_LOG, SUMMARY, FIGURE, OVERLAY, STEPS)
+    names = (GAPS, GAUGES, GAUGE_FIGURE, DRIVE_LOG, SUMMARY, FIGURE, OVERLAY, STEPS)
     for file in recording_files:
         same = file.resolve().parent == path.resolve()
         if same and (len(recording_files) > 1 or file.name in names):
@@ -148,7 +154,7 @@ def usual_folder(recording: str) -> Path:
 def save_measured(
     found: MeasuredInMemory, again: FrameSource, out: Path, *, overlay: bool = False, steps_frame: int | None = None
 ) -> OutputFolder:
-    """Write gaps.csv, summary.json, gap.png and, if requested, overlay.mp4 and steps/.
+    """Write gaps.csv, summary.json, the figures and, if requested, overlay.mp4 and steps/.
 
     Parameters
     ----------
@@ -185,6 +191,7 @@ def save_measured(
         if task.gauges:
             with GaugesCsv(folder.gauges) as numbers:
                 numbers.add(found.gauge_rows)
+            draw_gauges(folder.gauge_figure, found.tallies)
         if overlay:
             _draw_overlay(found, again, folder.overlay)
         if steps_frame is not None:
@@ -196,7 +203,8 @@ def save_measured(
             write_steps(wanted, found.how.settings, folder.steps)
         if (log := log_on_the_recording(found.clock, task)) is not None:
             write_drive_log(folder.drive_log, log)
-        draw_gap(folder.figure, series, task.drive, clock_drawn(found.clock, task))
+        if task.has_fingers:
+            draw_gap(folder.figure, series, task.drive, clock_drawn(found.clock, task))
         write_summary(folder.summary, found.summary)
     return folder
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError, OutputError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
+from fingervision.domain.status import Status
 from fingervision.frames.source import Description
 from fingervision.storage.gaps_csv import GapRow
 from fingervision.vision.overlay import draw_overlay
@@ -109,6 +110,6 @@ def words_of_row(row: GapRow) -> str:
     """Frame, time and gap in one line, with U = 2 u; without an uncertainty budget, u is the random part."""
     place = f"{row.frame}" if row.time_s is None else f"{row.frame}  {row.time_s:.3f} s"
     if row.gap_mm is None or row.u_random_mm is None:
-        return f"{place}  {row.status.value}"
+        return place if row.status is Status.NOT_ASKED else f"{place}  {row.status.value}"
     u_mm = row.u_random_mm if row.u_gap_mm is None else row.u_gap_mm
     return f"{place}  gap {row.gap_mm:.4f} mm  U {2.0 * u_mm:.4f} mm"

@@ -190,7 +190,7 @@ def _states_no_limits(scale: Scale) -> bool:
 def _about_scale(description: Description, settings: Mapping[str, Any], scale: Scale) -> list[str]:
     """Warning if the measuring height is less than a pixel, as where the scale is stated in another unit."""
     below_px = settings["below_tip_mm"] * scale.px_per_mm
-    if below_px >= 1.0:
+    if below_px >= 1.0 or settings["fingers"] == "none":
         return []
     shown = field_of_view((description.width_px, description.height_px), scale.px_per_mm)
     return [

@@ -18,6 +18,10 @@ from fingervision.measuring.scale import Scale, field_of_view, scale_for_frames
 from fingervision.vision.flanks import STEEPEST
 from fingervision.vision.pipeline import Settings
 
+NO_FINGERS = "none"
+FINGERS = {"auto": None, "dark": True, "light": False, NO_FINGERS: None}
+"""Whether the fingers are dark, by the name that options and files give it; None: found in the pictures."""
+
 
 @dataclass(frozen=True, slots=True)
 class Task:
@@ -49,8 +53,8 @@ class Task:
         Camera response, if the user knows it.
     bits : int or None
         Bit depth of levels stored in 16 bits; None determines it in every frame.
-    fingers_are_dark : bool or None
-        Whether the fingers are darker than the background; None determines it from the first frames.
+    fingers : str
+        Brightness of the fingers, one of `FINGERS`: auto determines it from the first frames, none asks for no gap.
     is_outline : bool
         Whether a thick part is measured at its whole outline, side walls included, rather than at its front face.
     steepest : float
@@ -73,7 +77,7 @@ class Task:
     steps_frame: int | None = None
     response: CameraResponse | None = None
     bits: int | None = None
-    fingers_are_dark: bool | None = None
+    fingers: str = "auto"
     is_outline: bool = False
     steepest: float = STEEPEST
     frames: tuple[int, int] | None = None
@@ -96,6 +100,11 @@ class Task:
             )
 
     @property
+    def has_fingers(self) -> bool:
+        """Whether the gap between fingers is asked for."""
+        return self.fingers != NO_FINGERS
+
+    @property
     def settings(self) -> Settings:
         """Settings for the image processing that do not depend on the recording."""
         return self.settings_for(())[0]
@@ -109,7 +118,8 @@ class Task:
             self.direction,
             self.region,
             self.bits,
-            self.fingers_are_dark,
+            FINGERS[self.fingers],
+            self.has_fingers,
             self.is_outline,
             self.steepest,
             CameraModel(response),
@@ -161,7 +171,7 @@ def task_for_frames(task: Task, description: Description) -> Task:
             f"{region.x_px},{region.y_px},{region.width_px},{region.height_px} (first column, row, width, height)."
         )
     below_px = task.below_tip_mm * task.scale.px_per_mm
-    if below_px >= max(width_px, height_px):
+    if task.has_fingers and below_px >= max(width_px, height_px):
         raise UsageError(
             f"--below-tip-mm must lie within the picture of {width_px}x{height_px} pixels, but "
             f"{task.below_tip_mm:g} mm are {below_px:.0f} px at {task.scale.px_per_mm:g} px/mm, at which the picture "
@@ -187,7 +197,7 @@ def in_words(task: Task, settings: Settings) -> dict[str, Any]:
         "response": settings.response.name,
         "response_known": settings.camera.response.is_known,
         "bits": task.bits,
-        "fingers": {None: "auto", True: "dark", False: "light"}[task.fingers_are_dark],
+        "fingers": task.fingers,
         "face": "outline" if task.is_outline else "front",
         "frames": None if task.frames is None else list(task.frames),
         "drive": task.drive is not None,

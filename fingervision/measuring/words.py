@@ -13,9 +13,14 @@ COVERAGE_FACTOR = 2.0
 
 
 def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]:
-    """Sentences with the number of measured frames, reasons for the others, the gap, its uncertainty, and advice."""
+    """Sentences with the number of measured frames, reasons for the others, the gap, its uncertainty, and advice.
+
+    The gauges have their own sentences in front of the advice.
+    """
     gap = summary["gap"]
     lines = [f"{gap['count']} of {series.frames} frames measured."]
+    if summary["settings"]["fingers"] == "none":
+        lines = [f"{series.frames} frames; no gap between fingers was asked for."]
     if gap["count"] and series.is_minority:
         lines = [
             f"Only {gap['count']} of {series.frames} frames {'was' if gap['count'] == 1 else 'were'} measured: the "
@@ -24,6 +29,7 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
     lines += [
         f"  {summary['counts'][status]} {status}, first frame {why['first_frame']}: {why['words']}"
         for status, why in summary["why"].items()
+        if status != Status.NOT_ASKED
     ]
     if gap["count"]:
         lines.append(f"Gap {gap['least_mm']:.4f} to {gap['greatest_mm']:.4f} mm, mean {gap['mean_mm']:.4f} mm.")
@@ -38,7 +44,20 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
                 "include the uncertainty of the scale, which was not stated."
             )
         lines += [*_learnt_camera(summary), *_assumed_response(summary, series)]
-    return [*lines, *summary["advice"]]
+    gauges = [gauge_sentence(name, gauge) for name, gauge in summary.get("gauges", {}).items()]
+    return [*lines, *gauges, *summary["advice"]]
+
+
+def gauge_sentence(name: str, gauge: Mapping[str, Any]) -> str:
+    """Sentence about one gauge, from its entry in summary.json."""
+    frames = sum(gauge["counts"].values())
+    ranges = [
+        f"{quantity} {found['least']:.4f} to {found['greatest']:.4f} {found['unit']}"
+        for quantity, found in gauge["quantities"].items()
+    ]
+    why = [f"{gauge['counts'][status]} {status}" for status in gauge["why"]]
+    words = "; ".join([*ranges, *why])
+    return f"Gauge {name} ({gauge['kind']}): {gauge['counts'].get('ok', 0)} of {frames} frames; {words}."
 
 
 def _assumed_response(summary: Mapping[str, Any], series: GapSeries) -> list[str]:
@@ -75,6 +94,9 @@ def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:
     """The result in one line: `gap 0.4021 mm, U = 1.20 µm (k = 2), 1 frame`."""
     gap, frames = summary["gap"], series.frames
     of = f"{frames} frame{'' if frames == 1 else 's'}"
+    if summary["settings"]["fingers"] == "none":
+        each = [f"{name} in {gauge['counts'].get('ok', 0)}" for name, gauge in summary.get("gauges", {}).items()]
+        return f"gauges in {of}: {', '.join(each) or 'none'}"
     if not gap["count"]:
         counts = ", ".join(f"{count} {status.value}" for status, count in series.counts.most_common())
         return f"no gap in {of}: {counts}; report() says why" if counts else "no frame"
@@ -91,4 +113,4 @@ def in_one_line(summary: Mapping[str, Any], series: GapSeries) -> str:
     return f"{few}{values}, U = {COVERAGE_FACTOR * 1e3 * u_mm:.2f} µm (k = 2{median}{only}), {found}{damage}"
 
 
-__all__ = ["in_one_line", "result_sentences"]
+__all__ = ["gauge_sentence", "in_one_line", "result_sentences"]

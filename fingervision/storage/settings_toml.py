@@ -13,7 +13,7 @@ from fingervision.storage.plain_file import in_utf8, toml_lines
 from fingervision.storage.toml_section import read_section
 
 TIPS = ("auto", *(direction.value for direction in Direction))
-POLARITIES = ("auto", "dark", "light")
+POLARITIES = ("auto", "dark", "light", "none")
 
 
 @dataclass(frozen=True, slots=True)

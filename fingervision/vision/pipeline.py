@@ -67,6 +67,7 @@ ALONE_PX = 3.0
 # Standard deviations by which what a frame's edges show differs from the usual if something else stands beside them,
 # and least relative differences of the squared residuals and of the flanks' squared blur.
 UNLIKE_SIGMAS, LEAST_UNLIKE = 5.0, (0.3, 0.06)
+NOT_ASKED = NoGap(Status.NOT_ASKED, "Nothing asks for the gap between fingers.")
 UNIFORM = NoGap(Status.LOW_CONTRAST, "The picture is uniform: no object differs from the background.")
 
 
@@ -205,6 +206,8 @@ class _Attempt:
 
 
 def _attempt(grey: GreyImage, settings: Settings, coded: CodedPicture) -> _Attempt:
+    if not settings.has_fingers:
+        return _Attempt(NOT_ASKED)
     if min(grey.shape) < SMALLEST_SIDE_PX:
         return _Attempt(NoGap(Status.NO_FINGERS, "The picture is too small to contain two fingers."))
     top = _top_level(grey, settings)

@@ -28,6 +28,8 @@ class Settings:
         Bit depth of levels stored in 16 bits; None determines it from the picture.
     fingers_are_dark : bool or None
         Whether the fingers are darker than the background; None determines it in every frame.
+    has_fingers : bool
+        Whether the gap between fingers is asked for; if not, nothing in a picture is taken for a finger.
     is_outline : bool
         Whether a thick part is measured at its whole outline, side walls included, rather than at its front face.
     steepest : float
@@ -41,6 +43,7 @@ class Settings:
     region: Region | None = None
     bits: int | None = None
     fingers_are_dark: bool | None = None
+    has_fingers: bool = True
     is_outline: bool = False
     steepest: float = STEEPEST
     camera: CameraModel = ASSUMED_CAMERA

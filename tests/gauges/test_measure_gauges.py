@@ -1,6 +1,7 @@
 """`measure --gauges` writes gauges.csv next to gaps.csv, in millimetres, for frames of any kind."""
 
 import csv
+import json
 from pathlib import Path
 
 import cv2
@@ -9,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
+from tests.csv_rows import csv_rows
 from tests.gauges.drawn import bar, drawn, half_plane, seen
 
 SHAPE = (96, 128)
@@ -61,6 +63,52 @@ def test_the_table(tmp_path: Path) -> None:
     assert (out / "overlay.mp4").stat().st_size > 0
     assert (out / "steps" / "07_gauges.png").exists()
     assert "bar" in words
+
+
+def test_where_nothing_asks_for_fingers_none_are_measured_and_the_report_is_about_the_gauges(tmp_path: Path) -> None:
+    code, words, out = _measured(tmp_path, EDGE + PAIR, "--rate-hz", "25")
+    assert code == 0, words
+    assert "finger " not in words
+    assert "one_finger" not in words
+    assert not (out / "gap.png").exists()
+    assert cv2.imread(str(out / "gauges.png")) is not None
+    assert [row["status"] for row in csv_rows(out / "gaps.csv")] == ["not_asked"] * 3
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["settings"]["fingers"] == "none"
+    assert summary["gauges"]["bar"]["counts"] == {"ok": 3}
+    for line in ("3 frames", "Gauge the, edge (edge): 3 of 3 frames", "gauges.png"):
+        assert line in words
+
+
+@pytest.mark.parametrize("asks", [("--fingers", "auto"), ("--roi", "0,0,128,96"), ("--tips", "up"), ("--steps", "0")])
+def test_an_option_about_fingers_asks_for_them(tmp_path: Path, asks: tuple[str, ...]) -> None:
+    _, words, out = _measured(tmp_path, PAIR, *asks)
+    assert "not_asked" not in {row["status"] for row in csv_rows(out / "gaps.csv")}
+    assert (out / "gap.png").exists()
+    assert "frames measured" in words
+
+
+def test_gauges_alone_have_no_height_below_tips(tmp_path: Path) -> None:
+    """At the scale of a microscope, 0.3 mm below a tip may lie outside the picture."""
+    code, words, out = _measured(tmp_path, PAIR, "--px-per-mm", "2000")
+    assert code == 0, words
+    assert float(csv_rows(out / "gauges.csv")[0]["value"]) == pytest.approx(0.01, abs=1e-4)
+
+
+def test_gauges_alone_without_any_number_say_why(tmp_path: Path) -> None:
+    far = PAIR.replace("x_px = 90", "x_px = 20").replace("distance_px = 20", "distance_px = 8")
+    code, words, _ = _measured(tmp_path, far)
+    assert code == 1
+    assert "No gauge has a value in any of the 3 frames: bar is" in words
+    assert "low_contrast in frame 0: the object has too little contrast" in words
+
+
+def test_a_drive_needs_the_gap(tmp_path: Path) -> None:
+    (tmp_path / "drive.csv").write_text("time_s,input_mm\n0,0\n1,1\n")
+    code, words, _ = _measured(tmp_path, PAIR, "--fingers", "none", "--drive", str(tmp_path / "drive.csv"))
+    assert code
+    assert "--drive" in words
+    assert "none" in words
 
 
 def test_a_gauge_outside_of_the_picture_is_refused(tmp_path: Path) -> None:

@@ -1,4 +1,7 @@
-"""Kinds of gauges, one per module, each with `SPEC`, the record of its settings, and `QUANTITIES`."""
+"""Kinds of gauges, one per module, each with `SPEC`, the record of its settings, and `QUANTITIES`.
+
+A kind that measures fingers states `ASKS_FOR_FINGERS`, so that `measure` looks for them in the whole picture too.
+"""
 
 import importlib
 import pkgutil

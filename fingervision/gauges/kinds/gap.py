@@ -16,6 +16,7 @@ from fingervision.vision.pipeline import Settings, measure_frame
 from fingervision.vision.single_picture import beside_in
 
 QUANTITIES = (("gap", "length"),)
+ASKS_FOR_FINGERS = True
 # Smallest region that can contain two fingers and the edges between them (`fingervision.vision.pipeline` refuses
 # smaller regions).
 SMALLEST_PX = 16.0
@@ -59,7 +60,8 @@ class FollowedGap:
             region.x_px, region.y_px, region.x_px + region.width_px - 1, region.y_px + region.height_px - 1,
         )  # fmt: skip
         zone = Mark(((x, y), (right, y), (right, bottom), (x, bottom), (x, y)))
-        found = measure_frame(picture.frame, self._with_beside(picture, replace(picture.settings, region=region)))
+        settings = replace(picture.settings, region=region, has_fingers=True)
+        found = measure_frame(picture.frame, self._with_beside(picture, settings))
         if not isinstance(found, GapMeasurement):
             return Reading(GaugeStatus(found.status.value), zone=zone, words=found.words)
         first, second = ((edge.x_px, edge.y_px) for edge in (found.left, found.right))

@@ -19,11 +19,11 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.errors import FingervisionError, NoCalibrationError, OutputError, StateError, UsageError
 from fingervision.domain.frame import Region
 from fingervision.domain.gap import GapMeasurement
-from fingervision.live.choices import FINGERS
 from fingervision.live.commands.asking import Answer, Request, box, check_scale, number, number_or_none, one_of, seen_of
 from fingervision.live.view import View
 from fingervision.measuring.picture_response import PictureResponse, read_sizes
 from fingervision.measuring.scale import stated_scale
+from fingervision.measuring.task import FINGERS
 from fingervision.storage.calibration_json import write_calibration
 from fingervision.storage.out_folder import make_out_folder
 from fingervision.vision.grey import to_grey
@@ -117,7 +117,7 @@ def _tips(view: View, request: Request) -> Answer:
 
 
 def _fingers(view: View, request: Request) -> Answer:
-    view.choose(fingers_are_dark=FINGERS[one_of(request, "fingers", tuple(FINGERS), "The brightness of the fingers")])
+    view.choose(fingers=one_of(request, "fingers", tuple(FINGERS), "The brightness of the fingers"))
     return Answer()
 
 

@@ -13,7 +13,6 @@ from fingervision.domain.gap import GapMeasurement
 from fingervision.inspection.catalogue import inspect
 from fingervision.inspection.report import as_json
 from fingervision.inspection.sample import take_sample
-from fingervision.live.choices import FINGERS
 from fingervision.live.commands.asking import Answer, Request, check_scale, file_inside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.view import View
@@ -122,7 +121,7 @@ def _load(view: View, request: Request) -> Answer:
     if "tips" in found:
         changes["direction"] = None if found["tips"] == "auto" else Direction(found["tips"])
     if "fingers" in found:
-        changes["fingers_are_dark"] = FINGERS[found["fingers"]]
+        changes["fingers"] = found["fingers"]
     if "roi" in found:
         changes["region"] = Region(*(int(side) for side in found["roi"].split(",")))
     if "scale" in changes:
