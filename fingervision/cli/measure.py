@@ -213,6 +213,7 @@ def _located(
     is_height_stated: bool,
 ) -> tuple["FollowedBodies", "Task"]:
     """Follow the bodies of the drawing, and state where its fingers and pairs are seen."""
+    from fingervision.frames.frame_range import frame_range
     from fingervision.frames.source import Wish, open_source
     from fingervision.measuring.body_poses import BodyTracker, FollowedBodies
     from fingervision.measuring.drawn_fingers import located
@@ -220,16 +221,20 @@ def _located(
     from fingervision.measuring.task import task_for_frames
 
     source = open_source(recording, Wish(rate_hz=rate_hz))
-    how = prepared(source.description, task_for_frames(task, source.description))
-    tracker = BodyTracker(drawing[0], task.scale, drawing[1], how.settings)
-    bodies = FollowedBodies(tracker, list(tracker.poses(coded(source, how.description.coding))))
+    complete = task_for_frames(task, source.description)
+    how = prepared(source.description, complete)
+    frames = coded(source, how.description.coding)
+    if task.frames is not None:
+        frames = frame_range(frames, *task.frames)
+    tracker = BodyTracker(drawing[0], complete.scale, drawing[1], how.settings)
+    bodies = FollowedBodies(tracker, list(tracker.poses(frames)))
     size_px = source.description.width_px, source.description.height_px
     return bodies, located(task, bodies, size_px, at_drawn_height=not is_height_stated)
 
 
 def _write_bodies(bodies: "FollowedBodies", folder: Path, task: "Task", *, as_json: bool) -> None:
     """Write bodies.csv, and print in how many frames each body was found."""
-    from fingervision.measuring.drawn_fingers import GAP
+    from fingervision.models.physical_gripper import GAP
 
     path, placed = bodies.write(folder), bodies.tracker.placed
     if as_json:

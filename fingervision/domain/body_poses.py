@@ -28,6 +28,9 @@ class SeenPose:
         that was stated without an uncertainty contributes nothing.
     random : ndarray of float, shape (3, 3), or None
         The random part of the covariance, which differs from frame to frame.
+    motion : ndarray of float, shape (3, 3), or None
+        Covariance of the difference between this pose and the first one of the same body: without the errors that
+        displace both alike, such as those of the drawing's placement.
     """
 
     status: str
@@ -36,6 +39,7 @@ class SeenPose:
     angle_mrad: float | None = None
     covariance: NDArray[np.float64] | None = None
     random: NDArray[np.float64] | None = None
+    motion: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,14 +15,37 @@ Point = tuple[float, float]
 # An angle is corrected for lens and plane by means of two points at this distance (pixels) on either side of its
 # middle.
 ANGLE_REACH_PX = 10.0
+SQRT_2 = 2.0**0.5
 
 
 class Cell(NamedTuple):
-    """Value, standard uncertainty and unit, as in a row of gauges.csv."""
+    """Value and standard uncertainties, as in a row of gauges.csv.
+
+    Parameters
+    ----------
+    value, u : float
+        Value and its standard uncertainty.
+    unit : str
+        Unit of value and uncertainties.
+    u_random : float
+        The part of `u` that differs from frame to frame.
+    u_phase : float
+        The part that depends on where edges lie within their pixels: it does not cancel in a motion.
+    relative_u : float
+        Relative standard uncertainty of a change of the value, shared by all frames.
+    """
 
     value: float
     u: float
     unit: str
+    u_random: float
+    u_phase: float = 0.0
+    relative_u: float = 0.0
+
+    def u_motion(self, first: "Cell") -> float:
+        """Standard uncertainty of the difference from a value in an earlier frame: what both share cancels."""
+        own = hypot(self.u_random, self.u_phase, first.u_random, first.u_phase)
+        return 0.0 if self is first else hypot(own, self.relative_u * (self.value - first.value))
 
 
 class Quantity(Protocol):
@@ -77,7 +100,7 @@ class Position:
     def in_pixels(self) -> Cell:
         """Position of the point along the direction, in pixels."""
         x, y = self.point_px
-        return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
+        return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px", self.u_px)
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
         """Position in millimetres from the picture's centre; for an edge, corrected by half of the edge bias."""
@@ -85,9 +108,10 @@ class Position:
         x, y = x - scale.middle_px[0], y - scale.middle_px[1]
         away_px = x * cos(self.direction_rad) + y * sin(self.direction_rad)
         value_px = away_px + 0.5 * self.dark_side * scale.edge_bias_px
-        shared_px = scale.relative_u(self.point_px, self.direction_rad) * away_px
+        relative = scale.relative_u(self.point_px, self.direction_rad)
         edge_px = scale.u_edge_px(self.u_response_px) if self.dark_side else 0.0
-        return Cell(value_px / scale.px_per_mm, hypot(self.u_px, shared_px, edge_px) / scale.px_per_mm, "mm")
+        phase_px = scale.u_phase_px if self.dark_side else 0.0
+        return _in_mm(scale, value_px, hypot(relative * away_px, edge_px), self.u_px, phase_px, relative)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +145,7 @@ class Distance:
     def in_pixels(self) -> Cell:
         """Distance between the two points, in pixels."""
         (x, y), (to_x, to_y) = self.points_px
-        return Cell(hypot(to_x - x, to_y - y), self.u_px, "px")
+        return Cell(hypot(to_x - x, to_y - y), self.u_px, "px", self.u_px)
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
         """Distance in millimetres, `(distance_px + p b) / s`, corrected for the edge bias like a gap."""
@@ -129,10 +153,11 @@ class Distance:
         apart_px = hypot(to_x - x, to_y - y)
         direction = atan2(to_y - y, to_x - x)
         middle = (0.5 * (self.first_px[0] + self.second_px[0]), 0.5 * (self.first_px[1] + self.second_px[1]))
-        shared_px = scale.relative_u(middle, direction) * apart_px
+        relative = scale.relative_u(middle, direction)
         edge_px = 2.0 * abs(self.polarity) * scale.u_edge_px(self.u_response_px)
         value_px = apart_px + self.polarity * scale.edge_bias_px
-        return Cell(value_px / scale.px_per_mm, hypot(self.u_px, shared_px, edge_px) / scale.px_per_mm, "mm")
+        phase_px = SQRT_2 * scale.u_phase_px
+        return _in_mm(scale, value_px, hypot(relative * apart_px, edge_px), self.u_px, phase_px, relative)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,16 +187,16 @@ class Shift:
     def in_pixels(self) -> Cell:
         """Displacement of the point along the direction, in pixels."""
         x, y = self.to_px[0] - self.from_px[0], self.to_px[1] - self.from_px[1]
-        return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px")
+        return Cell(x * cos(self.direction_rad) + y * sin(self.direction_rad), self.u_px, "px", self.u_px)
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
         """Displacement in millimetres; a bias common to both pictures cancels, the sub-pixel phase error does not."""
         (x, y), (to_x, to_y) = flat
         moved_px = (to_x - x) * cos(self.direction_rad) + (to_y - y) * sin(self.direction_rad)
-        shared_px = scale.relative_u(self.from_px, self.direction_rad) * moved_px
+        relative = scale.relative_u(self.from_px, self.direction_rad)
         # In the first frame, the shift is zero by definition and has no uncertainty.
         phase_px = scale.u_phase_px if self.u_px > 0.0 else 0.0
-        return Cell(moved_px / scale.px_per_mm, hypot(self.u_px, shared_px, phase_px) / scale.px_per_mm, "mm")
+        return _in_mm(scale, moved_px, hypot(relative * moved_px, phase_px), self.u_px, phase_px, relative)
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +227,7 @@ class Angle:
 
     def in_pixels(self) -> Cell:
         """Angle in the picture."""
-        return Cell(1e3 * self.angle_rad, 1e3 * self.u_rad, "mrad")
+        return Cell(1e3 * self.angle_rad, 1e3 * self.u_rad, "mrad", 1e3 * self.u_rad)
 
     def on_plane(self, flat: tuple[Point, ...], scale: PlaneScale) -> Cell:
         """The angle in the object plane, with the same number of full turns as in the picture."""
@@ -210,7 +235,15 @@ class Angle:
         turned = found - self.angle_rad
         value = self.angle_rad + (turned + pi) % (2.0 * pi) - pi
         shared = scale.u_angle_rad * (abs(sin(self.angle_rad)) if self.is_turn else 1.0)
-        return Cell(1e3 * value, 1e3 * hypot(self.u_rad, shared), "mrad")
+        u_random = 1e3 * self.u_rad
+        return Cell(1e3 * value, hypot(u_random, 1e3 * shared), "mrad", u_random, relative_u=scale.u_angle_rad)
+
+
+def _in_mm(
+    scale: PlaneScale, value_px: float, shared_px: float, u_random_px: float, phase_px: float, relative: float
+) -> Cell:
+    size, u_px = scale.px_per_mm, hypot(shared_px, u_random_px)
+    return Cell(value_px / size, u_px / size, "mm", u_random_px / size, phase_px / size, relative)
 
 
 def _ends(middle: Point, angle_rad: float) -> tuple[Point, Point]:

@@ -2,9 +2,9 @@
 
 from array import array
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import islice, zip_longest
 from math import nan
 from pathlib import Path
 from types import TracebackType
@@ -130,6 +130,8 @@ class Tally:
         Number of the first frame with each status, and its sentence, if it has one.
     courses : dict of str to Course
         Each quantity over time.
+    start : dict of str to Cell
+        First value of each quantity.
     without : Course
         Frames without a value.
     """
@@ -138,6 +140,7 @@ class Tally:
     first: dict[str, tuple[int, str]] = field(default_factory=dict)
     courses: dict[str, Course] = field(default_factory=dict)
     without: Course = field(default_factory=lambda: Course(""))
+    start: dict[str, Cell] = field(default_factory=dict)
 
 
 class GaugeRecording:
@@ -246,7 +249,8 @@ class GaugeRecording:
                 tally.first.setdefault(status, (index, reading.words))
                 if not reading.quantities:
                     tally.without.add(index, time_s)
-                own = gauge_rows(gauge, time_s, status, list(islice(cells, len(reading.quantities))), length)
+                found = list(islice(cells, len(reading.quantities)))
+                own = gauge_rows(gauge, time_s, status, found, length, tally.start)
                 rows += own
                 for row in own:
                     if row.value is not None and row.u is not None:
@@ -275,16 +279,26 @@ class GaugeRecording:
 
 
 def gauge_rows(
-    gauge: Gauge, time_s: float | None, status: str, cells: Sequence[Cell], length_unit: str
+    gauge: Gauge,
+    time_s: float | None,
+    status: str,
+    cells: Sequence[Cell],
+    length_unit: str,
+    start: MutableMapping[str, Cell],
 ) -> list[GaugeRow]:
-    """Rows of one gauge in one frame: one for each quantity, without values where there are no cells."""
-    units = {"length": length_unit, "angle": "mrad"}
-    none = (None,) * len(gauge.quantities)
-    values, u = [*(cell.value for cell in cells), *none], [*(cell.u for cell in cells), *none]
-    return [
-        GaugeRow(time_s, gauge.name, name, values[k], u[k], units[sort], status)
-        for k, (name, sort) in enumerate(gauge.quantities)
-    ]
+    """Rows of one gauge in one frame: one for each quantity, without values where there are no cells.
+
+    `start` are the gauge's first values, to which those of quantities that are not yet there are added.
+    """
+    rows = []
+    for (name, sort), cell in zip_longest(gauge.quantities, cells):
+        if cell is None:
+            unit = length_unit if sort == "length" else "mrad"
+            rows.append(GaugeRow(time_s, gauge.name, name, None, None, unit, status))
+            continue
+        u_motion = cell.u_motion(start.setdefault(name, cell))
+        rows.append(GaugeRow(time_s, gauge.name, name, cell.value, cell.u, cell.unit, status, cell.u_random, u_motion))
+    return rows
 
 
 def cells_of(quantities: Sequence[Any], plane: PlaneScale | None) -> list[Cell]:

@@ -28,6 +28,7 @@ from fingervision.models.hinge_correction import HingeTheory
 from fingervision.models.kinds import build_model, disagreements, kinds, small_displacements_alone
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_figures import MECHANISM_MODELS, MechanismModel, mechanism_figures, width_effect
+from fingervision.models.physical_gripper import GAP
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import MechanismDrawing, is_mechanism, read_drawing
 from fingervision.storage.out_folder import own_folder
@@ -169,8 +170,18 @@ class MechanismPrediction(Prediction):
         _write_columns(folder / "mechanism.csv", columns)
         if "gap_mm" in columns:
             poses = [name for name in columns if "." in name]
-            own = {name: columns[name] for name in ("input_mm", "gap_mm", "force_n", *poses)}
+            own = {"input_mm": columns["input_mm"], "gap_mm": columns["gap_mm"], **self._sides(kind)}
+            own |= {name: columns[name] for name in ("force_n", *poses)}
             _write_columns(folder / "simulation.csv", own)
+
+    def _sides(self, kind: str) -> dict[str, Array]:
+        """Positions of the gap's two points along its direction, from the middle at zero input, as in gaps.csv."""
+        first, last = self.mechanism.pairs[GAP]
+        apart = np.subtract(self.mechanism.probes[last], self.mechanism.probes[first])
+        way, states = 0.5 * apart / np.hypot(*apart), self.states[kind]
+        middle = np.array([np.add(state.probes_mm[first], state.probes_mm[last]) @ way for state in states])
+        half = 0.5 * np.array([state.pairs_mm[GAP] for state in states])
+        return {"left_mm": middle - half, "right_mm": middle + half}
 
 
 def _write_columns(path: Path, columns: Mapping[str, Array]) -> None:

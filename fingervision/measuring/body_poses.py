@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ from fingervision.measuring.pose_uncertainty import SharedErrors, SharedPose, in
 from fingervision.measuring.scale import Scale
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import column_name
-from fingervision.storage.bodies_csv import FLEXURES, add_channels, write_bodies, write_flexures
+from fingervision.storage.bodies_csv import FLEXURES, PARTS, add_channels, write_bodies, write_flexures
 from fingervision.vision.outline_chunks import Chunks, EdgeView, FlatMap
 from fingervision.vision.pipeline import Settings
 from fingervision.vision.response_shift import u_edge_px
@@ -105,8 +106,8 @@ class BodyTracker:
     mechanism : Mechanism
         The drawing.
     scale : Scale
-        Conversion from pixels to millimetres; lens distortion and perspective of a calibration are removed from the
-        outlines' points.
+        Conversion from pixels to millimetres, for pictures of this size; lens distortion and perspective of a
+        calibration are removed from the outlines' points.
     points : sequence of GivenPoint
         Points of the drawing and their positions in the first picture; if empty, the silhouette is used.
     settings : Settings
@@ -123,6 +124,7 @@ class BodyTracker:
                         for flexure in mechanism.flexures]  # fmt: skip
         self.placed: Placed | None = None
         self.first: list[StillPicture] = []
+        self._starts: dict[str, tuple[tuple[SharedPose, ...], Array]] = {}
 
     def poses(self, frames: Iterable[Frame | LostFrame]) -> Iterator[FramePoses]:
         """Yield the poses for each frame; the first readable frame determines the position of the drawing.
@@ -251,7 +253,7 @@ class BodyTracker:
     def _seen(self, grey: Array, view: EdgeView) -> dict[str, SeenPose]:
         if self.placed is None:
             raise AssertionError("no drawing was placed on the picture")
-        place, pyramid, before = self.placed.place, list[Array](), list(self._last)
+        into, pyramid, before = in_drawing(self.placed.place), list[Array](), list(self._last)
         found: dict[str, SeenPose] = {}
         shared: dict[str, SharedPose] = {}
         for number, outline in enumerate(self.outlines):
@@ -268,17 +270,20 @@ class BodyTracker:
             at = (about + fit.shift_px)[:, None]
             at = at if view.flat is None else view.flat.to_picture(at)
             shared[name] = self._shared.of_pose(fit, about, at[:, 0])
-            into = in_drawing(place)
             pose = into @ np.array([*fit.shift_px, fit.angle_rad])
             random = into @ fit.covariance @ into.T
-            whole = random + into @ shared[name].covariance @ into.T
+            whole = random + _shared_covariance((shared[name],), into)
             found[name] = SeenPose(OK, float(pose[0]), float(pose[1]), float(pose[2]), whole, random)
         for name in torn_off(self._joints, found):
             # The body was mistaken for something similar, so that the search in the next frame starts from its last
             # valid pose.
             number = next(k for k, outline in enumerate(self.outlines) if outline.body.name == name)
             found[name], self._last[number] = SeenPose(NOT_FOUND), before[number]
-        return found | self._hinges(found, shared)
+        for name, pose in found.items():
+            if pose.random is not None:
+                motion = self._motion(name, pose.random, (shared[name],), into)
+                found[name] = replace(pose, motion=motion)
+        return found | self._hinges(found, shared, into)
 
     def _why(self, grey: Array, chunks: Chunks, about: Array, last: tuple[Array, float], flat: FlatMap | None) -> str:
         height, width = grey.shape
@@ -287,7 +292,9 @@ class BodyTracker:
         inside = (x > 0.0) & (x < width) & (y > 0.0) & (y < height)
         return COVERED if inside.size and inside.mean() >= LEAST_IN_VIEW else OUT_OF_VIEW
 
-    def _hinges(self, poses: Mapping[str, SeenPose], shared: Mapping[str, SharedPose]) -> dict[str, SeenPose]:
+    def _hinges(
+        self, poses: Mapping[str, SeenPose], shared: Mapping[str, SharedPose], into: Array
+    ) -> dict[str, SeenPose]:
         """Angles of hinges: rotation of the body on one side of a hinge relative to the body on the other side."""
         found = {}
         for joint in self._joints:
@@ -302,16 +309,42 @@ class BodyTracker:
                 if pose.angle_mrad is not None and pose.random is not None:
                     angle += sign * pose.angle_mrad
                     random[2, 2] += float(pose.random[2, 2])
-            whole = random.copy()
-            whole[2, 2] += (1e3 * shared[last].u_turn_against(shared[first])) ** 2
-            found[flexure.name] = SeenPose(OK, None, None, angle, whole, random)
+            ends = shared[last], shared[first]
+            whole, motion = random + _shared_covariance(ends, into), self._motion(flexure.name, random, ends, into)
+            found[flexure.name] = SeenPose(OK, None, None, angle, whole, random, motion)
         return found
+
+    def _motion(self, name: str, random: Array, shared: tuple[SharedPose, ...], into: Array) -> Array:
+        """Covariance of the difference from the first measured pose of a body (or angle of a hinge)."""
+        start, start_random = self._starts.setdefault(name, (shared, random))
+        if start is shared:
+            return np.zeros((3, 3))
+        since = tuple(one.since(first) for one, first in zip(shared, start, strict=True))
+        return random + start_random + _shared_covariance(since, into)
 
     def _joined(self, flexure: str, side: float) -> BodyOutline:
         own = next(each for each in self.mechanism.flexures if each.name == flexure)
         at = np.array(own.point_mm(side * 1.3 * own.half_length_mm, 0.0))
         held = [o for o in self.outlines if o.body.holds(at[:, None])[0]]
         return held[0] if held else min(self.outlines, key=lambda o: float(np.hypot(*(o.body.centroid_mm - at))))
+
+
+def _coordinate(poses: Sequence[SeenPose], number: int, part: str) -> dict[str, float]:
+    """Range of one coordinate of a body, and medians of its standard uncertainty and of that of its motion."""
+    values = [value for pose in poses if (value := getattr(pose, part)) is not None]
+    whole, motion = (
+        [float(covariance[number, number]) ** 0.5 for covariance in covariances if covariance is not None]
+        for covariances in ((pose.covariance for pose in poses), (pose.motion for pose in poses[1:]))
+    )
+    u_motion = {"median_u_motion": float(np.median(motion))} if motion else {}
+    return {"least": min(values), "greatest": max(values), "median_u": float(np.median(whole)), **u_motion}
+
+
+def _shared_covariance(shared: tuple[SharedPose, ...], into: Array) -> Array:
+    """Covariance, in the drawing's units, of the errors that all frames share: of a body, or of a hinge's angle."""
+    if len(shared) == 1:
+        return np.asarray(into @ shared[0].covariance @ into.T)
+    return np.diag([0.0, 0.0, (1e3 * shared[0].u_turn_against(shared[1])) ** 2])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -334,6 +367,23 @@ class FollowedBodies:
         """Number of frames with each status, for every body and hinge."""
         names = self.poses[0].poses if self.poses else {}
         return {name: Counter(frame.poses[name].status for frame in self.poses) for name in names}
+
+    def in_words(self) -> dict[str, Any]:
+        """Summary of the poses, for summary.json: of every coordinate of the bodies, and every hinge's angle."""
+        names = self.poses[0].poses if self.poses else {}
+        seen = {name: [frame.poses[name] for frame in self.poses] for name in names}
+        return {
+            "name": self.tracker.mechanism.name,
+            "notes": list(self.tracker.placed.notes) if self.tracker.placed is not None else [],
+            "bodies": {
+                name: {
+                    "counts": dict(self.counts[name]),
+                    **{part: _coordinate(poses, number, part) for number, part in enumerate(PARTS)
+                       if any(getattr(pose, part) is not None for pose in poses)},
+                }
+                for name, poses in seen.items()
+            },
+        }  # fmt: skip
 
     def write(self, out: Path) -> Path:
         """Write bodies.csv and flexures.csv, and add columns to an existing gaps.csv; give the path of bodies.csv."""

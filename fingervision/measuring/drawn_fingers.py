@@ -20,11 +20,10 @@ from fingervision.measuring.drawing_placement import Placed
 from fingervision.measuring.task import Task
 from fingervision.models.mechanism import Mechanism
 from fingervision.models.mechanism_bodies import LinkBody, bodies_of
+from fingervision.models.physical_gripper import GAP
 
 Array = NDArray[np.float64]
 
-GAP = "gap"
-"""Name of the pair that is the fingers' gap."""
 FINENESS_PX = 0.25
 """Step of the search along a line for the outline of a body."""
 MARGIN_PX = 24
@@ -311,7 +310,7 @@ def located(task: Task, bodies: FollowedBodies, size_px: tuple[int, int], *, at_
         return task
     own = {gauge.name for gauge in task.gauges}
     pairs = tuple(each for each in pair_gauges(bodies, placed) if each.name not in own)
-    task = replace(task, gauges=(*task.gauges, *pairs))
+    task = replace(task, gauges=(*task.gauges, *pairs), mechanism=bodies.in_words())
     fingers = drawn_fingers(mechanism, placed.place, bodies.poses, size_px)
     if fingers is None or task.region is not None:
         return task

@@ -49,7 +49,8 @@ def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, co
     description = replace(description, notes=(*description.notes, *_on_the_log(task, series, clock)))
     given_s = task.drive_offset_s if task.drive is not None else None
     settings = {**in_words(task, how.settings), **clock_in_words(clock, given_s)}
-    return summarise(description, settings, task.scale, task.scale_file, series, complete=complete)
+    summary = summarise(description, settings, task.scale, task.scale_file, series, complete=complete)
+    return summary if task.mechanism is None else {**summary, "mechanism": dict(task.mechanism)}
 
 
 def _on_the_log(task: Task, series: GapSeries, clock: Clock) -> list[str]:

@@ -6,7 +6,7 @@ edges by which the drawing was placed.
 """
 
 from dataclasses import dataclass
-from math import hypot, pi
+from math import hypot, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,16 +69,24 @@ class SharedErrors:
         # Errors of the drawing's shift and rotation both displace the body's reference point.
         carried = np.array([[1.0, 0.0, -arm[1]], [0.0, 1.0, arm[0]], [0.0, 0.0, 1.0]])
         placed, shadows = np.zeros((3, 3)), fit.by_shadows
+        turn_rad = fit.angle_rad
         outward, scale = fit.by_outward, fit.by_scale + np.array([arm[0], arm[1], 0.0])
         if self.laid is not None:
-            placed = carried @ (self.laid.covariance + self.laid.by_shadows) @ carried.T
+            placed = carried @ _root(self.laid.covariance + self.laid.by_shadows)
             outward = outward - carried @ self.laid.by_outward
             scale = scale - carried @ self.laid.by_scale
         if self.plane is None:
-            return SharedPose(placed, np.zeros(3), self.size_error * scale, shadows, 0.0)
+            return SharedPose(placed, np.zeros(3), self.size_error * scale, shadows, 0.0, turn_rad)
         at = (float(in_picture[0]), float(in_picture[1]))
         u_edge_px = self.plane.u_edge_px(self.u_response_px)
-        return SharedPose(placed, u_edge_px * outward, self._relative(at) * scale, shadows, self.plane.u_angle_rad)
+        u_angle_rad = self.plane.u_angle_rad
+        return SharedPose(placed, u_edge_px * outward, self._relative(at) * scale, shadows, u_angle_rad, turn_rad)
+
+
+def _root(covariance: Array) -> Array:
+    """Return a matrix whose product with its own transpose is the covariance."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,27 +95,46 @@ class SharedPose:
 
     Parameters
     ----------
-    placed : ndarray of float, shape (3, 3)
-        Covariance due to the placement of the drawing.
+    by_placement : ndarray of float, shape (3, 3)
+        Changes of the pose, in columns, by one standard uncertainty of each independent error of the drawing's
+        placement.
     by_bias, by_scale : ndarray of float, shape (3,)
         Change of the pose by one standard uncertainty of the edge bias, and of the scale.
     by_shadows : ndarray of float, shape (3, 3)
         Covariance due to possible shadows along some of the body's own edges.
     u_angle_rad : float
         Standard uncertainty of an angle due to camera tilt and lens.
+    turn_rad : float
+        Rotation of the body.
     """
 
-    placed: Array
+    by_placement: Array
     by_bias: Array
     by_scale: Array
     by_shadows: Array
     u_angle_rad: float
+    turn_rad: float
+
+    def since(self, first: "SharedPose") -> "SharedPose":
+        """Effect of the shared errors on the motion between an earlier frame and this one.
+
+        What displaces the body alike in both frames cancels. Tilt and lens change an angle in proportion to it. A
+        shadow may lie differently in each frame.
+        """
+        return SharedPose(
+            self.by_placement - first.by_placement,
+            self.by_bias - first.by_bias,
+            self.by_scale - first.by_scale,
+            self.by_shadows + first.by_shadows,
+            self.u_angle_rad * abs(sin(self.turn_rad - first.turn_rad)),
+            self.turn_rad - first.turn_rad,
+        )
 
     @property
     def covariance(self) -> Array:
         """Covariance of all shared errors together, shape (3, 3)."""
         own = (
-            self.placed
+            self.by_placement @ self.by_placement.T
             + self.by_shadows
             + np.outer(self.by_bias, self.by_bias)
             + np.outer(self.by_scale, self.by_scale)

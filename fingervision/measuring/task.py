@@ -1,5 +1,6 @@
 """Settings of a measurement of a recording or of a live view."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
@@ -63,6 +64,8 @@ class Task:
         First and last frame to be measured, counted from 0, both included; None measures all.
     gauges : tuple of Gauge
         Gauges to be measured in addition to the gap; none by default.
+    mechanism : mapping or None
+        Summary of the poses of a drawing's bodies, for summary.json, if they were followed.
     """
 
     scale: Scale
@@ -82,6 +85,7 @@ class Task:
     steepest: float = STEEPEST
     frames: tuple[int, int] | None = None
     gauges: tuple[Gauge, ...] = ()
+    mechanism: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.below_tip_mm < float("inf"):

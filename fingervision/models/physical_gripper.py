@@ -144,6 +144,7 @@ def _own_answer(model: Model) -> SmallAnswer:
 # Model for the diagnosis of a mechanism whose drawing names its hinges, links and bodies.
 
 GAP = "gap"
+"""Name of the pair that is the fingers' gap."""
 
 
 @runtime_checkable

@@ -15,11 +15,11 @@ from fingervision.storage.row_file import cell, write_table
 COLUMNS = (
     "frame", "time_s", "body", "status", "x_mm", "y_mm", "angle_mrad", "u_x_mm", "u_y_mm", "u_angle_mrad",
     "cov_x_y_mm2", "cov_x_angle_mm_mrad", "cov_y_angle_mm_mrad", "u_random_x_mm", "u_random_y_mm",
-    "u_random_angle_mrad",
+    "u_random_angle_mrad", "u_motion_x_mm", "u_motion_y_mm", "u_motion_angle_mrad",
 )  # fmt: skip
 """Columns; each row is one body or hinge in one frame, and a hinge has only an angle. The uncertainties `u_` and
-covariances `cov_` contain all known contributions (including alignment of the drawing and calibration), and `u_random_`
-only the part that differs from frame to frame."""
+covariances `cov_` contain all known contributions (including alignment of the drawing and calibration), `u_random_`
+only the part that differs from frame to frame, and `u_motion_` those of the motion since the body's first pose."""
 PARTS = ("x_mm", "y_mm", "angle_mrad")
 
 
@@ -38,14 +38,14 @@ def _values(pose: SeenPose) -> list[float | None]:
     shared: list[float | None] = [None, None, None]
     if pose.covariance is not None and pose.x_mm is not None:
         shared = [float(pose.covariance[a, b]) for a, b in ((0, 1), (0, 2), (1, 2))]
-    u, random = (
+    u, random, motion = (
         [
             None if covariance is None or value is None else float(covariance[k, k]) ** 0.5
             for k, value in enumerate(values)
         ]
-        for covariance in (pose.covariance, pose.random)
+        for covariance in (pose.covariance, pose.random, pose.motion)
     )
-    return [*values, *u, *shared, *random]
+    return [*values, *u, *shared, *random, *motion]
 
 
 def add_channels(gaps: Path, poses: Sequence[FramePoses], names: Mapping[str, str]) -> None:

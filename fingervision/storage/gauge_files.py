@@ -108,7 +108,8 @@ def write_gauges_text(path: Path, text: str) -> None:
         part.write_text(text, encoding="utf-8")
 
 
-# The file gauges.csv: one row per frame and measured quantity, `time_s,gauge,quantity,value,u,unit,status`.
+# The file gauges.csv: one row per frame and measured quantity,
+# `time_s,gauge,quantity,value,u,unit,status,u_random,u_motion`.
 
 # As in gaps.csv; a microradian is a thousandth of a milliradian.
 TIME_PLACES, PLACES = 9, 7
@@ -125,6 +126,17 @@ class GaugeRow:
     u: Annotated[float | None, Field("standard uncertainty of the value", places=PLACES, low=0.0)]
     unit: Annotated[str, Field("unit of the value and its uncertainty: mm, px or mrad")]
     status: Annotated[str, Field("`ok`, or why there is no value")]
+    u_random: Annotated[
+        float | None, Field("the part of `u` that differs from frame to frame", places=PLACES, low=0.0)
+    ] = None
+    u_motion: Annotated[
+        float | None,
+        Field(
+            "standard uncertainty of the difference from the gauge's first value: errors that both values share cancel",
+            places=PLACES,
+            low=0.0,
+        ),
+    ] = None
 
 
 class GaugeRows(list[GaugeRow]):

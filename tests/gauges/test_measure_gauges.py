@@ -46,7 +46,7 @@ def test_the_table(tmp_path: Path) -> None:
     code, words, out = _measured(tmp_path, EDGE + PAIR + GAP, "--rate-hz", "25", "--overlay", "--steps", "1")
     assert code == 0, words
     lines = (out / "gauges.csv").read_text(encoding="utf-8").splitlines()
-    assert lines[0] == "time_s,gauge,quantity,value,u,unit,status"
+    assert lines[0] == "time_s,gauge,quantity,value,u,unit,status,u_random,u_motion"
     rows = list(csv.DictReader(lines))
     assert len(rows) == 9
     edges = [row for row in rows if row["gauge"] == "the, edge"]

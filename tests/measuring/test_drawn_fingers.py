@@ -1,5 +1,6 @@
 """With a drawing, the fingers and pairs of a whole mechanism are measured without a stated region."""
 
+import json
 from pathlib import Path
 
 import cv2
@@ -57,3 +58,28 @@ def test_a_film_of_a_whole_mechanism_gives_its_gap_and_pairs_in_every_frame(tmp_
             errors.append((float(row["value"]) - rest + 2.0 * closed) / float(row["u"]))
     assert np.sqrt(np.mean(np.square(errors))) < 2.0
     assert np.abs(errors).max() < 4.0
+
+
+def test_a_stated_scale_enters_the_poses_and_cancels_in_their_motion(tmp_path: Path) -> None:
+    film, stated = filmed(tmp_path / "film", 1.0), 0.999 * PX_PER_MM
+    given = ["measure", str(film), "--rate-hz", "25", "--px-per-mm", str(stated), "--u-px-per-mm", "0.01"]
+    printed(*given, "--mechanism", str(DRAWING), "--frames", "0:2", "--out", str(tmp_path / "out"))
+    rows = csv_rows(tmp_path / "out" / "bodies.csv")
+    assert {row["frame"] for row in rows} == {"0", "1", "2"}
+    for body, way in (("right_jaw", -1.0), ("left_jaw", 1.0)):
+        own = [row for row in rows if row["body"] == body]
+        error = np.array([[float(row["x_mm"]) - way * closed, float(row["y_mm"])]
+                          for row, closed in zip(own, CLOSED_MM, strict=False)])  # fmt: skip
+        u, u_motion = (np.array([[float(row[f"{name}_{part}_mm"]) for part in "xy"] for row in own])
+                       for name in ("u", "u_motion"))  # fmt: skip
+        assert np.all(np.abs(error) < 2.0 * u)
+        assert np.all(np.abs(error - error[0]) <= 3.0 * u_motion)
+        # The jaws lie 25 mm from the ground by which the drawing is placed: 0.1 % of this is common to all frames.
+        assert np.all(u[:, 1] > 0.02)
+        assert np.all(u_motion < 0.01)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    jaw = summary["mechanism"]["bodies"]["left_jaw"]
+    assert jaw["counts"] == {"ok": 3}
+    assert jaw["x_mm"]["greatest"] - jaw["x_mm"]["least"] == pytest.approx(0.9, abs=0.01)
+    for row in csv_rows(tmp_path / "out" / "gauges.csv"):
+        assert float(row["u_motion"]) < 0.5 * float(row["u"])

@@ -16,6 +16,7 @@ from fingervision.models.lumped import MechanismFrame
 from fingervision.models.mechanism_bodies import bodies_of, column_name, rigid_motion
 from fingervision.storage.gripper_toml import read_gripper
 from fingervision.storage.mechanism_toml import mechanism_from_tables, read_mechanism
+from tests.benchmarks.films_of_mechanisms import DRAWINGS as FILMED
 
 GRIPPER = Path("sample_frames/paper/gripper.toml")
 DRAWINGS = Path("fingervision/models/mechanisms")
@@ -126,3 +127,14 @@ def test_bodies_are_named_by_the_drawing() -> None:
     assert sorted(body.name for body in bodies_of(mechanism)) == ["body_2", "long_arm"]
     assert column_name("hinge, 2 (left)") == "hinge_2_left"
     assert column_name("###") == "body"
+
+
+def test_each_side_of_a_gap_moves_as_its_own_body_does(tmp_path: Path) -> None:
+    drawing = FILMED / "lever_jaw.toml"
+    done = CliRunner().invoke(command, [str(drawing), "--kind", "lumped", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    rows = np.genfromtxt(tmp_path / "simulation.csv", delimiter=",", names=True)
+    assert np.allclose(rows["right_mm"] - rows["left_mm"], rows["gap_mm"], atol=2e-7)
+    # The left tip belongs to the ground, and the right one to the lever: halves of the gap would move alike.
+    assert np.ptp(rows["right_mm"]) > 0.5
+    assert np.ptp(rows["left_mm"]) < 0.02 * np.ptp(rows["right_mm"])
