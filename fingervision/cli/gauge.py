@@ -6,7 +6,7 @@ import click
 
 from fingervision.cli._command import FILE, MEASURED, PAGE, make_command, option
 from fingervision.cli._options import out_option, port_option, rate_option, where_to_measure
-from fingervision.cli.live import LIVE_FOLDER, choices_of
+from fingervision.cli.live import LIVE_FOLDER, choices_of, with_fingers_asked
 from fingervision.domain.errors import UsageError
 
 EXAMPLES = """
@@ -77,5 +77,6 @@ def command(
             "`fingervision live CAMERA --gauges FILE`."
         )
     choices = choices_of(None, calibration, (px_per_mm, u_px_per_mm), below_tip_mm, tips, roi)
+    choices = with_fingers_asked(choices, gauges)
     showing = Showing(page=True, json_lines=False, way=Access(port=port), record=False, browser=not no_page)
     look_through(recorded(recording, rate_hz, choices, ()), out or LIVE_FOLDER, showing, Beside(), gauges)

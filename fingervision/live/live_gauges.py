@@ -1,24 +1,25 @@
 """Gauges on a live source: measured in every frame and tracked from the position at which they were drawn."""
 
-from collections import OrderedDict, deque
+from collections import deque
 from collections.abc import Mapping
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
+from fingervision.gauges.gauge_file import Gauge
 from fingervision.gauges.kinds import measured_together, unread
 from fingervision.gauges.picture import picture_of
 from fingervision.gauges.plane_scale import PlaneScale
+from fingervision.live.gauge_course import GaugeCourse, told
 from fingervision.live.playback.gauge_board import GaugeBoard
-from fingervision.live.playback.gauge_following import FOLLOWING, GAUGES, NO_SCALE, GaugesBeside, told
+from fingervision.live.playback.gauge_following import FOLLOWING, GAUGES, NO_SCALE, GaugesBeside
 from fingervision.live.session import Session
 from fingervision.storage.gaps_csv import GapRow
 
-FRAMES_KEPT = 16
-"""Number of frames whose readings are stored: half a second at 25 frames per second, as a page only needs the readings
-of the newest picture.
-"""
+FRAMES_KEPT = 15_000
+"""Number of frames whose readings are stored: ten minutes at 25 frames per second, as in the page's charts."""
 FRAMES_COUNTED = 100
 """Number of the most recent frames among which those measured without gauges are counted for the page."""
 
@@ -40,11 +41,23 @@ class LiveGauges:
 
     def __init__(self, session: Session, board: GaugeBoard) -> None:
         self._session, self._board = session, board
-        self._followers: dict[str, tuple[Mapping[str, Any], Any]] = {}
-        self._read: OrderedDict[int, tuple[int, list[dict[str, Any]]]] = OrderedDict()
+        self._followers: dict[str, tuple[Mapping[str, Any], Any, int]] = {}
+        self._numbers = count()
+        self.course = GaugeCourse(FRAMES_KEPT)
+        self.gauges: Mapping[int, Gauge] = {}
+        """The gauges that are followed, by the numbers of their readings; a changed gauge has a new number."""
         self._scale: object = None
         self._left_out: deque[bool] = deque(maxlen=FRAMES_COUNTED)
-        self.frames = 0
+
+    @property
+    def frames(self) -> int:
+        """Number of frames measured so far."""
+        return self.course.frames
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the readings are those of all frames: of a live source, those until now."""
+        return True
 
     @property
     def first(self) -> int | None:
@@ -68,8 +81,8 @@ class LiveGauges:
 
     def readings(self, frame: int, version: int) -> list[dict[str, Any]] | None:
         """Readings in one frame for a given version of the gauges; None if there are no readings."""
-        found = self._read.get(frame)
-        return found[1] if found is not None and found[0] == version else None
+        found = self.course.find(frame)
+        return found.readings if found is not None and found.version == version else None
 
     def see(self, item: Frame | LostFrame, row: GapRow | None) -> None:
         """Measure the gauges in the next frame; an error of a gauge does not end the measurement of the gap."""
@@ -79,7 +92,7 @@ class LiveGauges:
         is_left_out = self._session.in_a_hurry
         self._left_out.append(is_left_out)
         if is_left_out:
-            for _, follower in self._followers.values():
+            for _, follower, _ in self._followers.values():
                 follower.lost()
             return
         with self._session.supervisor.watching(FOLLOWING):
@@ -97,9 +110,10 @@ class LiveGauges:
         self._followers = {
             gauge.name: kept[gauge.name]
             if gauge.name in kept and kept[gauge.name][0] == tables.get(gauge.name)
-            else (tables.get(gauge.name, {}), gauge.spec.follower())
+            else (tables.get(gauge.name, {}), gauge.spec.follower(), next(self._numbers))
             for gauge in gauges
         }
+        self.gauges = {self._followers[gauge.name][2]: gauge for gauge in gauges}
         status = row.status if row is not None else None
         followers = [self._followers[gauge.name][1] for gauge in gauges]
         if isinstance(item, LostFrame):
@@ -111,10 +125,7 @@ class LiveGauges:
             readings = list(measured_together(followers, picture_of(item, settings)))
         description = self._session.description
         plane = PlaneScale(task.scale, (description.width_px, description.height_px))
-        self._read[item.index] = version, told(gauges, readings, plane)
-        self.frames += 1
-        while len(self._read) > FRAMES_KEPT:
-            self._read.popitem(last=False)
+        self.course.add(item.index, item.time_s, version, told(self.gauges, readings, plane))
 
 
 def put_live_gauges(session: Session, path: Path, *, is_asked_for: bool = False) -> GaugesBeside:

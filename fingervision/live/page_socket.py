@@ -177,7 +177,8 @@ def known_by(page: WebSocket) -> Known:
     numbers = [asked.get(name, "") for name in ("rows", "messages")]
     if not all(number.isascii() and number.isdigit() and len(number) <= MOST_DIGITS for number in numbers):
         return Known()
-    return Known(asked.get("view", ""), *(int(number) for number in numbers))
+    rows, messages = (int(number) for number in numbers)
+    return Known(asked.get("view", ""), rows, messages)
 
 
 def request_of(text: str) -> dict[str, Any]:

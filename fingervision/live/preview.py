@@ -16,7 +16,9 @@ from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.domain.status import Status
 from fingervision.live.commands import section
 from fingervision.live.frame_measurement import Seen
+from fingervision.live.gauge_course import for_charts
 from fingervision.live.page_words import page_json
+from fingervision.live.playback.gauge_following import GAUGES, GaugesBeside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.saved_page import MOST_BYTES, saved_page, seen_at
 from fingervision.live.view import View
@@ -42,11 +44,14 @@ class Known:
         Identity of the view to which the row numbers refer; empty for a page without data.
     rows, messages : int
         Number of rows and of messages that the page has.
+    gauges : (int, int)
+        What `GaugeCourse.after` returned of the readings that the page has.
     """
 
     identity: str = ""
     rows: int = 0
     messages: int = 0
+    gauges: tuple[int, int] = (-1, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +91,17 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
     with view.supervisor.watching("Describing the measurement"):
         measured = {"points": points(view, rows), "now": _now(view, seen or view.seen)}
     state = {**_STATES.of(view), **(about or {})}
+    gauge_points = _gauge_points(view, *known.gauges, ROWS_AT_ONCE)
+    if gauge_points is not None and "version" in (told := state["gauges"]):
+        # The state may be of another picture than this one.
+        state["gauges"] = {**told, **view.features[GAUGES].readings_in(seen or view.seen, told["version"])}
     head = {
         "view": identity,
         "first": first,
         "last": last,
         "count": count,
         **measured,
+        "gauge_points": gauge_points,
         "state": state,
         "overlay": None if seen is None else _overlay(seen.outcome),
         "messages": [[each.number, each.name, each.words] for each in said],
@@ -103,7 +113,16 @@ def message(view: View, known: Known, seen: Seen | None, about: Mapping[str, Any
             picture = _PICTURES.of(seen)
     content = struct.pack(">I", len(words)) + words + picture
     newest = max([known.messages if is_same else 0, *(each.number for each in said)])
-    return Next(content, Known(identity, last, newest))
+    has = known.gauges if gauge_points is None else (gauge_points["begun"], gauge_points["known"])
+    return Next(content, Known(identity, last, newest, has))
+
+
+def _gauge_points(view: View, begun: int, known: int, most: int) -> dict[str, Any] | None:
+    """Readings of the gauges that a page does not know yet; None without gauges."""
+    beside = view.features.get(GAUGES)
+    if not isinstance(beside, GaugesBeside):
+        return None
+    return for_charts(beside.following.course, beside.following.gauges, begun, known, most)
 
 
 def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
@@ -124,7 +143,7 @@ def points(view: View, rows: list[GapRow]) -> list[list[Any]]:
             row.gap_mm,
             _u_mm(row),
             row.frame,
-            "" if row.status is Status.OK else row.status.value,
+            "" if row.status in (Status.OK, Status.NOT_ASKED) else row.status.value,
             None if row.u_gap_mm is None else row.u_random_mm,
             *beside,
         ]
@@ -184,8 +203,11 @@ def page_file(view: Playback, frames: Sequence[int], folder: Path) -> str:
     Raises
     ------
     StateError
-        The recording is moved by another page meanwhile.
+        The recording is moved by another page meanwhile, or its gauges are not measured in all frames yet.
     """
+    beside = view.features.get(GAUGES)
+    if isinstance(beside, GaugesBeside):
+        beside.refuse_part()
     shown, pictures, room = view.frame, list[tuple[dict[str, Any], bytes]](), MOST_BYTES
     for frame in frames:
         seen = seen_at(view, frame)
@@ -193,12 +215,15 @@ def page_file(view: Playback, frames: Sequence[int], folder: Path) -> str:
         room -= len(picture)
         if room < 0:
             break
-        pictures.append(({"now": _now(view, seen), "overlay": _overlay(seen.outcome)}, picture))
+        about = {"now": _now(view, seen), "overlay": _overlay(seen.outcome), "gauges": section(view)["gauges"]}
+        pictures.append((about, picture))
     view.seek(shown)
-    state = {**view.state(), **section(view), "gauges": None, "viewer": True, "holds_pen": False, "is_saved": True}
+    state = {**view.state(), **section(view), "viewer": True, "holds_pen": False, "is_saved": True}
     told = [[each.number, each.name, each.words] for each in view.messages]
     rows = list(view.rows(0, view.row_count))
-    return saved_page(folder, {"state": state, "points": points(view, rows), "messages": told}, pictures)
+    content: dict[str, Any] = {"state": state, "points": points(view, rows), "messages": told}
+    content["gauge_points"] = _gauge_points(view, -1, 0, view.row_count)
+    return saved_page(folder, content, pictures)
 
 
 def state_has_changed() -> None:

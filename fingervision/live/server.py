@@ -21,19 +21,21 @@ from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, R
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from fingervision.domain.errors import FingervisionError, ProcessError, UsageError
+from fingervision.domain.errors import FingervisionError, ProcessError, StateError, UsageError
 from fingervision.live.access import Access
 from fingervision.live.commands import modules
 from fingervision.live.commands.model import MODEL
 from fingervision.live.guard import EVERYWHERE, VIEWER, WRITER, Guard, PatientProtocol
 from fingervision.live.page_socket import ONLY_LOOKS, TRY_AGAIN_LATER, PageSocket
 from fingervision.live.pen import Pen
+from fingervision.live.playback.gauge_following import GAUGES, GaugesBeside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.second_recording import SECOND
 from fingervision.live.preview import coded, page_file
 from fingervision.live.supervisor import sentence
 from fingervision.live.view import View
 from fingervision.storage.gaps_csv import GapsCsv
+from fingervision.storage.gauge_files import GaugesCsv
 from fingervision.storage.out_folder import make_out_folder, out_folder
 
 if TYPE_CHECKING:
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
 # Saving of the gaps that the browser page shows.
 
 DRIVE_COLUMNS = ("run", "input_mm", "force_n")
-SAVED_GAPS = "live_gaps.csv"
+SAVED_GAPS, SAVED_GAUGES = "live_gaps.csv", "live_gauges.csv"
 
 
 def save_gaps(view: View) -> Path:
@@ -61,6 +63,27 @@ def save_gaps(view: View) -> Path:
     is_driven = any(row.input_mm is not None for row in rows)
     with GapsCsv(path, DRIVE_COLUMNS if is_driven else ()) as table:
         table.add(rows)
+    return path
+
+
+def save_gauges(view: View) -> Path:
+    """Save the readings of the gauges in the format of gauges.csv.
+
+    Raises
+    ------
+    StateError
+        There are no gauges, or they are not measured in all frames yet.
+    OutputError
+        The file cannot be written.
+    """
+    beside = view.features.get(GAUGES)
+    if not isinstance(beside, GaugesBeside):
+        raise StateError("Gauges must be drawn before their values can be saved, but there are none.")
+    beside.refuse_part()
+    make_out_folder(view.out)
+    path = view.out / SAVED_GAUGES
+    with GaugesCsv(path) as table:
+        table.add(beside.rows)
     return path
 
 
@@ -190,6 +213,7 @@ class Page:
                 Route("/", self._index),
                 Route("/page/{name}", self._file),
                 Route("/gaps.csv", self._gaps),
+                Route("/gauges.csv", self._gauges),
                 Route("/steps/{number}.png", self._step),
                 Route("/verdict/{name}", self._verdict),
                 Route("/second.jpg", self._second),
@@ -260,6 +284,13 @@ class Page:
         except FingervisionError as error:
             return PlainTextResponse(str(error), 500)
         return FileResponse(path, media_type="text/csv", filename="gaps.csv")
+
+    async def _gauges(self, request: Request) -> Response:
+        try:
+            path = await asyncio.to_thread(save_gauges, self._view)
+        except FingervisionError as error:
+            return PlainTextResponse(str(error), 500)
+        return FileResponse(path, media_type="text/csv", filename="gauges.csv")
 
     async def _step(self, request: Request) -> Response:
         pictures = {str(number): picture for number, (_, picture) in enumerate(self._steps)}

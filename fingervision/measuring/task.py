@@ -1,6 +1,6 @@
 """Settings of a measurement of a recording or of a live view."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
@@ -22,6 +22,11 @@ from fingervision.vision.pipeline import Settings
 NO_FINGERS = "none"
 FINGERS = {"auto": None, "dark": True, "light": False, NO_FINGERS: None}
 """Whether the fingers are dark, by the name that options and files give it; None: found in the pictures."""
+
+
+def fingers_asked(gauges: Sequence[Gauge], *, is_described: bool) -> str:
+    """Which fingers are meant if the user states none: some if they are described, or if a gauge measures them."""
+    return "auto" if is_described or any(gauge.asks_for_fingers for gauge in gauges) else NO_FINGERS
 
 
 @dataclass(frozen=True, slots=True)

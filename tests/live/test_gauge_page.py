@@ -3,8 +3,10 @@
 import json
 import subprocess
 import sys
+import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
+from itertools import combinations
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,9 +26,10 @@ from fingervision.live.playback.gauge_board import ChangedMeanwhileError, FieldE
 from fingervision.live.playback.gauge_following import GaugesBeside, put_gauges_beside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.recorded import recorded
+from fingervision.storage.gauge_files import gauges_text
 from tests.csv_rows import csv_rows
 from tests.gauges.drawn import bar, drawn, half_plane, seen
-from tests.live.browser import browser, opened, says, shown, typed
+from tests.live.browser import browser, downloaded, keep, opened, says, shown, typed
 from tests.live.test_page_layout import findings
 from tests.waiting import until
 
@@ -260,8 +263,8 @@ def test_readings_are_those_of_measure(opened_on: Opened, frames: Path, tmp_path
         found += [[each["name"], *cell, each["status"]] for each in readings for cell in each["cells"]]
     assert len(found) == len(rows) == 2 * FRAMES
     for ours, theirs in zip(found, rows, strict=True):
-        assert [ours[0], ours[1], ours[4], ours[5]] == [theirs[0], theirs[1], theirs[4], theirs[5]]
-        assert ours[2:4] == pytest.approx([float(theirs[2]), float(theirs[3])], abs=1e-6)
+        assert [ours[0], ours[1], ours[4], ours[-1]] == [theirs[0], theirs[1], theirs[4], theirs[5]]
+        assert [*ours[2:4], ours[5]] == pytest.approx([float(theirs[k]) for k in (2, 3, 6)], abs=1e-6)
     # After any change nothing of before is shown.
     obey(view, {"do": "gauge_remove", "name": "the edge"})
     assert beside.following.readings(0, beside.board.version) is None
@@ -298,8 +301,10 @@ def test_gauges_are_drawn_dragged_typed_and_saved_in_the_page(
     shown(page, "document.querySelector('#gauge_kind').options.length > 5")
     assert page.locator("#gauges").get_attribute("open") is not None
 
-    # The picture stands still from here on: the table is whole (and has no gap, which gauges do not need).
-    page.locator("#place", has_text="None of the 12 frames").wait_for()
+    # The table is whole; nothing asks for fingers, and nothing is said of them.
+    shown(page, "document.querySelector('#place').textContent === 'frame 0 of 12'")
+    assert not page.locator("#gap_mm").is_visible()
+    assert not page.locator("#status").is_visible()
 
     # Drawn with the mouse: across an edge; then dragged by its middle.
     page.select_option("#gauge_kind", "edge")
@@ -389,3 +394,133 @@ def test_the_panel_is_in_the_live_page_of_a_recording_and_costs_nothing_until_it
     page.locator("#gauge_list button").wait_for()
     typed(page, "#px_per_mm", "20")
     page.locator("#gauge_list .bad, #gauge_list .good").wait_for()
+
+
+def charts(page: Any) -> dict[str, str]:
+    """Heads of the gauges' charts: what each shows, and its value in the frame that is shown."""
+    heads = [line.split(" (") for line in page.locator("#gauge_charts figcaption").all_inner_texts()]
+    return {name: value.partition(") ")[2] for name, value in heads}
+
+
+def series(page: Any) -> list[list[Any]]:
+    """Values of all series of the page's gauges: name, quantity, unit, and time, value, lower end and status."""
+    return page.evaluate(  # type: ignore[no-any-return]
+        "import('/page/series_data.js').then(m => m.gaugeSeries().map(s => "
+        "[s.gauge, s.quantity, s.unit, s.time, s.value, s.low, s.status]))"
+    )
+
+
+def test_each_gauge_has_a_chart_and_all_that_is_saved_has_the_gauges(
+    live: Callable[..., Any], opened: Callable[..., Any], frames: Path, tmp_path: Path
+) -> None:
+    # The bar's gauge reaches less far than its bar is away: it has no value in any frame.
+    line = {**EDGE, "name": "lean", "kind": "line", "angle_deg": 90.0, "x_px": 80}
+    del line["direction_deg"]
+    lost = {**BAR, "name": "lost", "x_px": 225, "distance_px": 12}
+    path = tmp_path / "gauges.toml"
+    path.write_text(gauges_text([(table, None) for table in (EDGE, line, lost)], None, 1), encoding="utf-8")
+    options = ["--rate-hz", "25", "--px-per-mm", "20", "--gauges", str(path)]
+    command = [sys.executable, "-m", "fingervision", "measure", str(frames), *options]
+    subprocess.run([*command, "--out", str(tmp_path / "measured")], check=True)
+    table = (tmp_path / "measured" / "gauges.csv").read_text(encoding="utf-8")
+
+    view = live(frames, *options, "--port", "0", "--no-page", name="gauge")
+    page = opened(view.address, viewport={"width": 1280, "height": 800})
+    shown(page, "document.querySelectorAll('#gauge_charts figure').length === 4")
+    page.locator("#scrub").fill("7")
+    page.locator("#gauge_list li", has_text="lean").locator(".good").wait_for()
+    until(lambda: len(series(page)[0][3]) == FRAMES)
+    # One chart for each quantity, with the values of the table and their uncertainty, or why there is none.
+    rows = csv_rows(tmp_path / "measured" / "gauges.csv")
+    for name, quantity, unit, times, values, low, statuses in series(page):
+        own = [row for row in rows if (row["gauge"], row["quantity"]) == (name, quantity)]
+        assert times == pytest.approx([float(row["time_s"]) for row in own])
+        assert [status or "ok" for status in statuses] == [row["status"] for row in own]
+        assert {unit} == {row["unit"] for row in own}
+        if name == "lost":
+            assert values == [None] * FRAMES
+            continue
+        assert values == pytest.approx([float(row["value"]) for row in own], abs=1e-6)
+        expanded = [value - least for value, least in zip(values, low, strict=True)]
+        assert expanded == pytest.approx([2 * float(row["u"]) for row in own], abs=1e-6)
+    heads = charts(page)
+    assert list(heads) == ["the edge: position", "lean: position", "lean: angle", "lost: distance"]
+    seen = {row["gauge"]: row for row in rows if float(row["time_s"]) == pytest.approx(7 / 25)}
+    assert heads["lost: distance"] == seen["lost"]["status"].replace("_", " ")
+    assert float(heads["the edge: position"].split(" ±")[0]) == pytest.approx(
+        float(seen["the edge"]["value"]), abs=1e-5
+    )
+    words = page.inner_text("body")
+    assert "finger " not in words.replace("fingervision", "")
+    assert "one_finger" not in words
+    assert str(tempfile.gettempdir()) not in words.replace(str(tmp_path), "")
+    # The chart that is pointed at is read out, and measured.
+    box = page.locator("#gauge_charts .u-over").nth(2).bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"])
+    page.locator("#readout", has_text="lean: angle").wait_for()
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 0.5 * box["height"], steps=4)
+    page.mouse.up()
+    page.locator("#range_words", has_text="mrad/s").wait_for()
+    page.keyboard.press("Escape")
+
+    # Saved: the table of `measure`, what is seen of it, and the page with all of it.
+    saved = downloaded(page, lambda: page.click("#save_csv"))
+    assert saved.read_text(encoding="utf-8") == table
+    seen_rows = csv_rows(downloaded(page, lambda: page.click("#save_seen")))
+    assert len(seen_rows) == len(rows)
+    assert "lean: angle (mrad)" in downloaded(page, lambda: page.click("#save_svg")).read_text(encoding="utf-8")
+    keep(page, "gauges_1280")
+    document = tmp_path / "page.html"
+    document.write_bytes(downloaded(page, lambda: page.click("#save_page")).read_bytes())
+    kept = page.context.new_page()
+    kept.goto(document.as_uri())
+    shown(kept, "document.querySelectorAll('#gauge_charts figure').length === 4")
+    kept.keyboard.press("End")
+    shown(kept, f"document.querySelector('#gap_mm').dataset.frame === '{FRAMES - 1}'")
+    last = next(row for row in reversed(rows) if row["gauge"] == "the edge")
+    assert float(charts(kept)["the edge: position"].split(" ±")[0]) == pytest.approx(float(last["value"]), abs=1e-5)
+    kept.locator("#gauge_list li", has_text="the edge").locator(".good").wait_for()
+    assert kept.locator("#gauge_drawing .mark.found").count() > 0
+    assert not kept.locator("#gauge_form").is_visible()
+    assert not kept.locator("#alarm").is_visible()
+    kept.close()
+
+    # Names in the picture do not lie on each other, on a screen or on a phone.
+    for width, height in ((1280, 800), (390, 844)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.keyboard.press("Home")
+        shown(page, "document.querySelector('#gap_mm').dataset.frame === '0'")
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert findings(page) == []
+        boxes = page.evaluate(
+            "[...document.querySelectorAll('#gauge_drawing text')].map(e => e.getBoundingClientRect())"
+            ".map(r => [r.left, r.right, r.top, r.bottom])"
+        )
+        assert len(boxes) == 3
+        for one, other in combinations(boxes, 2):
+            apart = [min(one[k + 1], other[k + 1]) - max(one[k], other[k]) for k in (0, 2)]
+            assert min(apart) <= 1.0, boxes
+    keep(page, "gauges_390")
+    assert view.stop() == 0
+
+
+def test_where_a_gauge_asks_for_the_gap_it_is_shown_beside_the_gauges(
+    live: Callable[..., Any], opened: Callable[..., Any], tmp_path: Path
+) -> None:
+    path, opening = tmp_path / "gauges.toml", Path(__file__).parents[2] / "sample_frames" / "opening"
+    path.write_text((opening / "gauges.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    view = live(
+        opening / "opening.mp4", "--px-per-mm", "34", "--gauges", path, "--port", "0", "--no-page", name="gauge"
+    )
+    page = opened(view.address, viewport={"width": 1280, "height": 800})
+    shown(page, "Number(document.querySelector('#gap_mm').textContent) > 0")
+    shown(page, "document.querySelectorAll('#gauge_charts figure').length === 4")
+    assert page.locator("#chart .u-over").is_visible()
+    # Without fingers there is no gap, and the gauges stay.
+    page.locator("#set_up summary").click()
+    page.select_option("#fingers", "none")
+    page.locator("#chart").wait_for(state="hidden")
+    shown(page, "document.querySelectorAll('#gauge_charts figure').length === 4")
+    page.locator("#gauge_list .good").first.wait_for()
+    assert view.stop() == 0

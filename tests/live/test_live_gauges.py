@@ -1,5 +1,6 @@
 """Gauges on a live source: unchanged gauges continue, drawn gauges start anew; without a scale, no readings."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,9 +17,13 @@ from fingervision.frames.source import Wish
 from fingervision.live.beside import Beside, stand_beside
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey, section
-from fingervision.live.live_gauges import FRAMES_KEPT, put_live_gauges
+from fingervision.live.gauge_course import GaugeCourse
+from fingervision.live.live_gauges import put_live_gauges
 from fingervision.live.opening import opened
+from fingervision.live.preview import Known, message
+from fingervision.live.server import save_gauges
 from fingervision.live.session import Session
+from tests.csv_rows import csv_rows
 from tests.gauges.drawn import bar, drawn, half_plane, seen
 
 WIDTH, HEIGHT, PER_FRAME = 640, 480, 3.0
@@ -85,10 +90,10 @@ def test_a_lost_frame_a_hurry_and_a_missing_scale_give_no_number_and_say_so(
     assert read(session, frames[0])[0]["status"] == "ok"
     (lost,) = read(session, LostFrame(1, 0.04, Status.DAMAGED, "cut off"))
     assert (lost["status"], lost["cells"], lost["words"]) == ("damaged", [], "cut off")
-    for again in range(2 * FRAMES_KEPT):
+    for again in range(32):
         assert read(session, Frame(frames[0].pixels, 10 + again, 0.0))[0]["status"] == "ok"
     following = session.features["gauges"].following
-    assert following.readings(0, session.features["gauges"].board.version) is None
+    assert [row.status for row in session.features["gauges"].rows] == ["ok", "damaged"] + ["ok"] * 32
     with monkeypatch.context() as patch:
         patch.setattr(Session, "in_a_hurry", True)
         assert read(session, Frame(frames[0].pixels, 90, 0.0)) is None
@@ -96,6 +101,49 @@ def test_a_lost_frame_a_hurry_and_a_missing_scale_give_no_number_and_say_so(
     session.choices = Choices()
     assert read(session, Frame(frames[0].pixels, 91, 0.0)) is None
     assert "scale" in following.trouble
+
+
+def test_a_changed_gauge_begins_a_new_series_and_the_others_go_on(
+    session: Session, frames: list[Frame], tmp_path: Path
+) -> None:
+    put_live_gauges(session, tmp_path / "gauges.toml", is_asked_for=True)
+    obey(session, {"do": "gauge_add", "table": EDGE})
+    obey(session, {"do": "gauge_add", "table": BAR})
+    read(session, frames[0])
+    first = message(session, Known(), None)
+    told = headed(first.content)["gauge_points"]
+    (edge, name, quantities), (bar_number, _, _) = told["gauges"]
+    assert (name, quantities) == ("edge", [["position", "mm"]])
+    assert [row[1] for row in told["rows"]] == [0]
+    obey(session, {"do": "gauge_change", "name": "edge", "changes": {"length_px": 50}})
+    read(session, frames[1])
+    told = headed(message(session, first.known, None).content)["gauge_points"]
+    assert [each[0] for each in told["gauges"]] != [edge, bar_number]
+    assert bar_number in [each[0] for each in told["gauges"]]
+    assert [row[1] for row in told["rows"]] == [1]
+    # What is saved are the gauges as they are now.
+    rows = session.features["gauges"].rows
+    assert [(row.gauge, row.time_s) for row in rows] == [("bar", 0.0), ("edge", 0.04), ("bar", 0.04)]
+    (path := tmp_path / "saved.csv").write_bytes(save_gauges(session).read_bytes())
+    assert [row["value"] for row in csv_rows(path)] == [f"{row.value:.7f}" for row in rows]
+
+
+def test_readings_are_kept_as_long_as_a_live_chart_goes_back() -> None:
+    course, most = GaugeCourse(8), 8
+    for frame in range(50):
+        course.add(frame, 0.04 * frame, 1, [])
+        assert course.find(frame) is not None
+    assert course.find(50 - 2 * most) is None
+    begun, first, entries = course.after(0, 47, 100)
+    assert (begun, first, [entry.frame for entry in entries]) == (0, 47, [47, 48, 49])
+    # Somebody who knows frames of before gets all that is kept.
+    assert course.after(0, 3, 100)[1] == course.after(7, 3, 100)[1] >= 50 - 1.25 * most
+    course.begin()
+    assert course.after(0, 50, 100) == (1, 0, [])
+
+
+def headed(content: bytes) -> dict:
+    return json.loads(content[4 : 4 + int.from_bytes(content[:4], "big")])
 
 
 def test_gauges_need_the_page() -> None:

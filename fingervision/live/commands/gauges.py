@@ -127,9 +127,8 @@ def section(view: View) -> dict[str, Any]:
     found = view.features.get(GAUGES)
     if not isinstance(found, GaugesBeside):
         return {"gauges": {"is_open": False} if isinstance(view, Playback | Session) else None}
-    board, following, seen = found.board, found.following, view.seen
+    board, following = found.board, found.following
     version, tables = board.version, board.tables
-    frame = None if seen is None else seen.frame.index
     return {
         "gauges": {
             "is_open": True,
@@ -142,9 +141,9 @@ def section(view: View) -> dict[str, Any]:
             "tables": [dict(table) for table in tables],
             "first": following.first or 0,
             "frames": following.frames,
+            "is_whole": following.is_whole,
             "trouble": following.trouble,
-            "frame": frame,
-            "readings": None if frame is None else following.readings(frame, version),
+            **found.readings_in(view.seen, version),
         }
     }
 

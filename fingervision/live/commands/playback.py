@@ -11,6 +11,8 @@ from fingervision.live.playback.gauge_following import GAUGES, GaugesBeside
 from fingervision.live.playback.playback import Playback
 from fingervision.live.playback.track import WHOLE, arguments_of
 from fingervision.live.view import View
+from fingervision.measuring.task import NO_FINGERS
+from fingervision.measuring.words import gauge_sentence
 
 # Measurement of a range of a recording by the command `measure`, whose results are saved.
 
@@ -82,11 +84,14 @@ def _words(output: str) -> str:
     try:
         summary = json.loads(output)
         gap = summary["gap"]
+        gauges = " ".join(gauge_sentence(name, gauge) for name, gauge in summary.get("gauges", {}).items())
+        if summary["settings"]["fingers"] == NO_FINGERS:
+            return gauges
         if not gap["count"]:
-            return "No frame has a gap."
+            return f"No frame has a gap. {gauges}".strip()
         return (
             f"{gap['count']} frames measured: gap {gap['least_mm']:.4f} to {gap['greatest_mm']:.4f} mm, mean "
-            f"{gap['mean_mm']:.4f} mm."
+            f"{gap['mean_mm']:.4f} mm. {gauges}".strip()
         )
     except (ValueError, LookupError, TypeError):
         return "Measured."

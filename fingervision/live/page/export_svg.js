@@ -1,10 +1,8 @@
-// The chart as it is seen, drawn as lines and letters: gap with its band and model, and the residual under it.
+// The charts as they are seen, drawn as lines and letters: each with its band, and a model beside it.
 import { at, colour } from "/page/bus.js";
 import { decimals } from "/page/axis_labels.js";
-import { failures } from "/page/chart_failures.js";
-import { terms } from "/page/gap_data.js";
 
-const WIDE = 900, LEFT = 70, RIGHT = 15, TOP = 34, GAP_HIGH = 300, RESIDUAL_HIGH = 150, BETWEEN = 22, FOOT = 44, TICKS = 6;
+const WIDE = 900, LEFT = 70, RIGHT = 15, TOP = 34, BETWEEN = 22, FOOT = 44, TICKS = 6;
 const escaped = (words) => words.replace(/[&<>]/g, (sign) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[sign]);
 function ticks(low, high) {
   const least = (high - low) / TICKS, power = 10 ** Math.floor(Math.log10(least)), step = [1, 2, 5, 10].map((each) => each * power).find((each) => each >= least);
@@ -41,16 +39,19 @@ function panel(name, [times, value, low, high, model], [from, to], top, tall, st
   for (const piece of model ? pieces(xs, model.map(y)) : []) lines.push(`<polyline points="${piece.join(" ")}" fill="none" stroke="${colour("--model")}" stroke-width="1.5" stroke-dasharray="7 4"/>`);
   lines.push(`<rect x="${LEFT}" y="${top}" width="${WIDE - LEFT - RIGHT}" height="${tall}" fill="none" stroke="${ink}"/>`);
   lines.push(`<text transform="translate(16 ${top + tall / 2}) rotate(-90)" text-anchor="middle">${label}</text>`);
-  return [`<g id="${name}">${lines.join("")}</g>`, x];
+  return `<g id="${name}">${lines.join("")}</g>`;
 }
-// `gap` and `residual` are columns as the charts hold them, [from, to] the times seen.
-export function svg(title, gap, residual, [from, to]) {
+// Panels under each other with one time axis: name, columns as the charts hold them, height, colour and label of each, and its
+// failures; [from, to] are the times seen.
+export function svg(title, panels, [from, to]) {
   const inside = (columns) => { const keep = columns[0].map((time) => time >= from && time <= to); return columns.map((column) => column.filter((_, i) => keep[i])); };
-  const [drawn, x] = panel("gap", inside(gap), [from, to], TOP, GAP_HIGH, colour("--accent"), "gap (mm)");
-  let foot = TOP + GAP_HIGH;
-  const parts = [drawn];
-  for (const run of failures(from, to)) parts.push(`<rect x="${(x(run.from) - 1).toFixed(2)}" y="${foot - 8}" width="${Math.max(2, x(run.to) - x(run.from) + 2).toFixed(2)}" height="8" fill="${colour("--bad")}"><title>${escaped(run.status)}</title></rect>`);
-  if (residual) { parts.push(panel("residual", inside(residual), [from, to], foot + BETWEEN, RESIDUAL_HIGH, colour("--model"), `${terms()[1]} (µm)`)[0]); foot += BETWEEN + RESIDUAL_HIGH; }
+  const parts = [], x = (time) => LEFT + ((time - from) / (to - from)) * (WIDE - LEFT - RIGHT);
+  let foot = TOP - BETWEEN;
+  for (const { name, columns, high, stroke, label, failing } of panels) {
+    parts.push(panel(name, inside(columns), [from, to], foot + BETWEEN, high, colour(stroke), escaped(label)));
+    foot += BETWEEN + high;
+    for (const run of failing) parts.push(`<rect x="${(x(run.from) - 1).toFixed(2)}" y="${foot - 8}" width="${Math.max(2, x(run.to) - x(run.from) + 2).toFixed(2)}" height="8" fill="${colour("--bad")}"><title>${escaped(run.status)}</title></rect>`);
+  }
   for (const [at, words] of ticks(from, to)) parts.push(`<text x="${x(at).toFixed(2)}" y="${foot + 16}" text-anchor="middle">${words}</text>`);
   parts.push(`<text x="${(LEFT + WIDE - RIGHT) / 2}" y="${foot + 34}" text-anchor="middle">time (s)</text>`);
   const high = foot + FOOT;

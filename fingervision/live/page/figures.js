@@ -43,6 +43,7 @@ listen("now", (now) => {
 });
 
 listen("state", (state) => {
+  document.body.classList.toggle("fingerless", state.fingers === "none");
   document.body.classList.toggle("trouble", Boolean(state.trouble));
   // Of a long path its end tells most; the whole is what the pointer shows.
   const parts = state.source.split(/[/\\]+/).filter(Boolean);

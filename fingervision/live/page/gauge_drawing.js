@@ -6,7 +6,7 @@ import { dragged, drawn, handles, outline } from "/page/gauge_shapes.js";
 const ASK_EVERY_MS = 100, LETTER = 12, POINT = 6, LEAST_PX = 3;
 at("stage").insertAdjacentHTML("beforeend", '<svg id="gauge_drawing" aria-hidden="true" preserveAspectRatio="none"></svg>');
 const svg = at("gauge_drawing"), SVG = svg.namespaceURI;
-let drag = null, askedAt = 0, taken = [];
+let drag = null, askedAt = 0;
 export const drawing = { kind: null, name: "", said: () => {} };
 
 const make = (name, attributes, words = "") => {
@@ -27,12 +27,11 @@ function readingsHere() {
 }
 export function draw() {
   svg.replaceChildren();
-  taken = [];
   svg.classList.toggle("drawing", Boolean(drawing.kind));
   if (!isOpen()) return;
   const { width, height } = at("picture"), unit = width / (svg.clientWidth || width);
   svg.setAttribute("viewBox", `-0.5 -0.5 ${width} ${height}`);
-  const readings = readingsHere(), first = isFirst(), now = chosen();
+  const readings = readingsHere(), first = isFirst(), now = chosen(), named = [];
   tables().forEach((table, i) => {
     const reading = readings && readings[i], is = table === now || (now && table.name === now.name) ? " chosen" : "";
     const good = reading ? (reading.status === "ok" ? " found" : " failed") : "";
@@ -42,23 +41,33 @@ export function draw() {
       if (mark.length > 1) svg.append(line(mark, `mark${good}`));
       else for (const [a, b] of [[1, 0], [0, 1]]) svg.append(line([[mark[0][0] - 5 * unit * a, mark[0][1] - 5 * unit * b], [mark[0][0] + 5 * unit * a, mark[0][1] + 5 * unit * b]], `mark${good}`));
     }
-    const places = first ? outline(table).flat() : reading ? [...reading.zone, ...reading.marks.flat()] : [];
-    if (places.length) name(table, reading, places, unit, width, good + is);
+    const places = [...(first ? outline(table).flat() : []), ...(reading ? [...reading.zone, ...reading.marks.flat()] : [])];
+    if (places.length) named.push([table, reading, boxOf(places), good + is]);
   });
+  const taken = named.map(([, , box]) => box);
+  for (const each of named) taken.push(name(...each, unit, [width, height], taken));
   if (drag && drag.kind === "new") svg.append(line([drag.from, drag.to], "set chosen"));
   if (first && works() && !drawing.kind) for (const table of tables()) points(table, unit, now && table.name === now.name);
 }
-function name(table, reading, places, unit, width, kind) {
-  const words = reading && reading.status !== "ok" ? `${table.name}: ${reading.status}` : table.name;
-  const right = Math.max(...places.map(([x]) => x)), top = Math.min(...places.map(([, y]) => y));
-  const wide = words.length * LETTER * 0.58 * unit;
-  const x = Math.max(2 * unit, Math.min(right + 4 * unit, width - wide - 2 * unit)), high = 1.15 * LETTER * unit;
-  let y = Math.max(top, LETTER * unit);
-  // Names that would lie on each other stand below each other.
-  const meets = ([x0, x1, at_y]) => x < x1 && x0 < x + wide && Math.abs(at_y - y) < high;
-  for (let tries = 0; tries < taken.length && taken.some(meets); tries += 1) y = Math.max(...taken.filter(meets).map(([, , at_y]) => at_y)) + high;
-  taken.push([x, x + wide, y]);
-  svg.append(make("text", { x: x.toFixed(1), y: y.toFixed(1), "font-size": (LETTER * unit).toFixed(2), class: kind.trim() }, words));
+// Boxes are [left, top, right, bottom].
+const boxOf = (places) => [[0, Math.min], [1, Math.min], [0, Math.max], [1, Math.max]].map(([k, least]) => least(...places.map((place) => place[k])));
+const shared = (a, b) => Math.max(0, Math.min(a[2], b[2]) - Math.max(a[0], b[0])) * Math.max(0, Math.min(a[3], b[3]) - Math.max(a[1], b[1]));
+// The name of a gauge stands beside it, where it covers least of the gauges and of the names before it.
+function name(table, reading, box, kind, unit, [width, height], taken) {
+  const text = make("text", { "font-size": (LETTER * unit).toFixed(2), class: kind.trim() }, reading && reading.status !== "ok" ? `${table.name}: ${reading.status.replaceAll("_", " ")}` : table.name);
+  svg.append(text);
+  const { width: wide, height: high, y: above } = text.getBBox(), apart = 3 * unit, [left, top, right, bottom] = box;
+  const beside = [right + apart, left - apart - wide].flatMap((x) => [top, bottom - high, top - high, bottom].map((y) => [x, y]));
+  const places = [...beside, [left, top - high - apart], [left, bottom + apart], [left, top - 2 * high - apart], [left, bottom + high + apart]];
+  let best = null, least = Infinity;
+  for (const [x, y] of places) {
+    const at_x = Math.max(0, Math.min(x, width - wide)), at_y = Math.max(0, Math.min(y, height - high)), own = [at_x, at_y, at_x + wide, at_y + high];
+    const covered = taken.reduce((sum, each) => sum + shared(own, each), 0);
+    if (covered < least) { least = covered; best = own; }
+  }
+  text.setAttribute("x", best[0].toFixed(1));
+  text.setAttribute("y", (best[1] - above).toFixed(1));
+  return best;
 }
 function points(table, unit, is) {
   for (const [handle, x, y] of handles(table)) {

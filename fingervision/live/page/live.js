@@ -5,6 +5,7 @@ import "/page/figures.js";
 import "/page/chart.js";
 import "/page/readout.js";
 import "/page/residual_panel.js";
+import "/page/gauge_charts.js";
 import "/page/measured_range.js";
 import "/page/export_files.js";
 import "/page/dragging.js";

@@ -1,7 +1,7 @@
 // A recording: a slider, buttons and keys to step, play, mark a range and measure it.
 import { ask, at, listen, on, page, say, typed } from "/page/bus.js";
 import { key } from "/page/keys.js";
-import { gaps, nearest } from "/page/gap_data.js";
+import { gaps, nearest } from "/page/series_data.js";
 import { redraw } from "/page/chart.js";
 import { marks } from "/page/time_ruler.js";
 

@@ -12,7 +12,7 @@ panel("set_up", 'Set-up <span id="set_up_head" class="quiet"></span>', `
   <div class="row">
     <button id="inspect">Look at the set-up</button>
     <button id="drag_height" aria-pressed="false">Drag height</button>
-    <label>Fingers <select id="fingers"><option>auto</option><option>dark</option><option>light</option></select></label>
+    <label>Fingers <select id="fingers"><option>auto</option><option>dark</option><option>light</option><option>none</option></select></label>
   </div>
   <p id="set_up_words" role="status"></p>
   <ul id="findings"></ul>

@@ -13,12 +13,12 @@ function ofChanges(gap, common) {
   return Math.sqrt(Math.min(most, Math.max(0, slope)) || 0);
 }
 
-// `columns` as in gap_data.
+// `columns` as in series_data.
 export function statistics(columns, from, to) {
-  const places = columns.time.flatMap((time, i) => (time >= from && time <= to && columns.gap[i] !== null ? [i] : []));
+  const places = columns.time.flatMap((time, i) => (time >= from && time <= to && columns.value[i] !== null ? [i] : []));
   if (places.length < 2) return null;
-  const of = (name) => places.map((i) => columns[name][i]), time = of("time"), gap = of("gap");
-  const u = places.map((i) => (columns.high[i] - columns.gap[i]) / 2), random = places.map((i, k) => columns.random[i] ?? u[k]);
+  const of = (name) => places.map((i) => columns[name][i]), time = of("time"), gap = of("value");
+  const u = places.map((i) => (columns.high[i] - columns.value[i]) / 2), random = places.map((i, k) => columns.random[i] ?? u[k]);
   const n = places.length, time_0 = mean(time), gap_0 = mean(gap), spread = sum(time.map((t) => (t - time_0) ** 2));
   const slope = sum(time.map((t, k) => (t - time_0) * (gap[k] - gap_0))) / spread;
   const noise = mean(random.map((each) => each ** 2)), fixed = Math.max(0, mean(u.map((each) => each ** 2)) - noise);
@@ -26,7 +26,7 @@ export function statistics(columns, from, to) {
   const rest = n > 2 ? sum(time.map((t, k) => (gap[k] - gap_0 - slope * (t - time_0)) ** 2)) / (n - 2) : 0;
   // Where the gap does not follow a line, what is left over widens the slope's uncertainty, as it does not follow one.
   const U_slope = 2 * Math.hypot(Math.sqrt(Math.max(rest, noise) / spread), slope * relative);
-  const residual = places.flatMap((i) => (columns.model[i] === null ? [] : [columns.gap[i] - columns.model[i]]));
+  const residual = places.flatMap((i) => (columns.model[i] === null ? [] : [columns.value[i] - columns.model[i]]));
   // How much of the difference of two recordings is common to all frames is not known: nothing is taken to average out.
   const u_difference = places.flatMap((i) => (columns.u_difference[i] === null ? [] : [columns.u_difference[i]]));
   return {

@@ -1,16 +1,21 @@
 // The chart read out: by the pointer, and by arrow keys from sample to sample.
-import { at, listen, page } from "/page/bus.js";
-import { gaps, halfOf, nearest, terms } from "/page/gap_data.js";
+import { at, listen } from "/page/bus.js";
+import { gaps, halfOf, nameOf, nearest, saidOf, shown, terms, zeroOf } from "/page/series_data.js";
 import { showTime, view } from "/page/chart.js";
 
+// The sample of the gap at a place, or that of the gauge whose chart is pointed at in the same frame.
 export function words(i) {
-  const zero = page.state ? page.state.zero_mm : 0, gap = gaps.gap[i], status = gaps.status[i];
-  const parts = [`frame ${gaps.frame[i]}`, `${gaps.time[i].toFixed(3)} s`];
-  if (gap === null) parts.push(`no gap: ${(status || "–").replaceAll("_", " ")}`);
+  const [first] = shown(), series = shown().includes(view.pointed) ? view.pointed : first || gaps;
+  const k = series === gaps ? i : nearest(gaps.time[i], series), parts = [`frame ${gaps.frame[i]}`, `${gaps.time[i].toFixed(3)} s`];
+  if (k < 0 || series.frame[k] !== gaps.frame[i]) return parts.join(" · ");
+  if (series !== gaps) parts.push(nameOf(series));
+  const value = series.value[k], model = series.model[k];
+  if (series !== gaps) parts.push(`${saidOf(series, k)}${value === null ? "" : ` ${series.unit}`}`);
+  else if (value === null) parts.push(`no gap: ${saidOf(gaps, k)}`);
   else {
-    const half = gaps.high[i] - gap;
-    parts.push(`${(gap - zero).toFixed(4)}${half > 0 ? ` ± ${half.toFixed(4)}` : ""} mm`);
-    if (gaps.model[i] !== null) parts.push(`${terms()[0]} ${(gaps.model[i] - zero).toFixed(4)} mm, ${terms()[1]} ${(1000 * (gap - gaps.model[i])).toFixed(1)} ± ${(1000 * halfOf(gaps, i)).toFixed(1)} µm`);
+    const zero = zeroOf(gaps), half = gaps.high[k] - value;
+    parts.push(`${(value - zero).toFixed(4)}${half > 0 ? ` ± ${half.toFixed(4)}` : ""} mm`);
+    if (model !== null) parts.push(`${terms()[0]} ${(model - zero).toFixed(4)} mm, ${terms()[1]} ${(1000 * (value - model)).toFixed(1)} ± ${(1000 * halfOf(gaps, k)).toFixed(1)} µm`);
   }
   return parts.join(" · ");
 }

@@ -1,27 +1,19 @@
 // The residual under the gap, on the same time axis: measured less predicted, with its band; and where it is largest.
 import { ask, at, colour, listen, on, page, tell } from "/page/bus.js";
-import { decimals } from "/page/axis_labels.js";
-import { gaps, residuals, terms } from "/page/gap_data.js";
-import { axisOf, bandOf, cursor, make as makeChart, redraw, seriesOf, sizeOf, steer, view } from "/page/chart.js";
+import { gaps, residuals, terms } from "/page/series_data.js";
+import { axisOf, bandOf, briefTimes, make as makeChart, placeBefore, plot, redraw, remove, seriesOf, view } from "/page/chart.js";
 import { key } from "/page/keys.js";
 import { goTo } from "/page/readout.js";
 
-// Without a label, which would take a third of the panel's height: the unit stands behind each time.
-const seconds = (chart, places, axis, room, step) => places.map((at) => `${at.toFixed(decimals(step))} s`);
 function make() {
-  if (view.residual) view.residual.destroy();
+  remove(view.residual);
   const shade = "--model";
-  view.residual = new uPlot({
-    ...sizeOf("residual_chart"),
-    legend: { show: false },
-    cursor,
-    scales: { x: { time: false } },
-    axes: [{ ...axisOf("time (s)"), label: null, values: seconds }, axisOf(`${terms()[2]} (µm)`)],
-    series: [{}, seriesOf("residual", shade), seriesOf("low"), seriesOf("high")],
+  view.residual = plot(at("residual_chart"), gaps, {
+    axes: [briefTimes(), axisOf(`${terms()[2]} (µm)`)],
+    lines: [{}, seriesOf("residual", shade), seriesOf("low"), seriesOf("high")],
     bands: [bandOf(shade)],
-    hooks: { draw: [zeroLine, (chart) => tell("drawn", chart)] },
-  }, [[], [], [], []], at("residual_chart"));
-  steer(view.residual);
+    draw: zeroLine,
+  });
 }
 function zeroLine(chart) {
   const y = chart.valToPos(0, "y", true), { left, top, width, height } = chart.bbox;
@@ -43,13 +35,13 @@ listen("state", ({ model, second }) => {
 });
 listen("charted", (from, scale) => {
   if (!view.residual || at("residual_chart").hidden) return;
-  view.residual.batch(() => { view.residual.setData(residuals(from), false); if (scale) view.residual.setScale("x", scale); });
+  view.residual.batch(() => { view.residual.setData(residuals(placeBefore(gaps, from)), false); if (scale) view.residual.setScale("x", scale); });
 });
 listen("scaled", (min, max) => { if (view.residual) view.residual.setScale("x", { min, max }); });
 
 function worst() {
   let place = -1, most = -1;
-  gaps.gap.forEach((gap, i) => {
+  gaps.value.forEach((gap, i) => {
     const size = gap === null || gaps.model[i] === null ? -1 : Math.abs(gap - gaps.model[i]);
     if (size > most) { most = size; place = i; }
   });
@@ -59,7 +51,4 @@ function worst() {
 }
 on("worst", "click", worst);
 key(["w"], "the frame at which the model is worst, or two recordings differ most", () => (at("worst").hidden ? false : worst()));
-listen("start", () => {
-  new ResizeObserver(() => { if (view.residual) { view.residual.setSize(sizeOf("residual_chart")); redraw(); } }).observe(at("residual_chart"));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (view.residual) { make(); redraw(); } });
-});
+listen("recoloured", () => { if (view.residual) { make(); redraw(); } });

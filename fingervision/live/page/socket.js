@@ -58,6 +58,7 @@ async function take(buffer) {
   }
   rows = head.last;
   tell("points", head.points);
+  tell("gauge_points", head.gauge_points);
   for (const [name_number, name, words] of head.messages) { said = name_number; tell("message", words, name); }
   tell("state", head.state);
   if (!page.paused) {

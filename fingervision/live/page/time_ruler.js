@@ -1,17 +1,17 @@
 // The ruler of a recording's time behind its slider: seconds, failures, turning points and the marked range.
 import { at, colour, listen, page } from "/page/bus.js";
-import { failures } from "/page/chart_failures.js";
-import { gaps, nearest } from "/page/gap_data.js";
+import { allFailures } from "/page/chart_failures.js";
+import { gaps, nearest } from "/page/series_data.js";
 import { decimals } from "/page/axis_labels.js";
 
 export const THUMB_PX = 8; // as in live.css
 const HIGH_PX = 34, MARK_PX = 6, APART_PX = 62, USUAL_RATE_HZ = 25, DRAWN_EVERY_MS = 150;
 // A turn is a way back of at least this share of the gap's whole range, and of so many standard uncertainties.
 const TURN_SHARE = 0.05, TURN_U = 6;
-let turning = [], dirty = true, last = "", drawnAt = 0;
+let turning = [], failing = [], dirty = true, last = "", drawnAt = 0;
 
 // Places of the samples at which the gap turns.
-export function turningPoints({ gap, high }) {
+export function turningPoints({ value: gap, high }) {
   const known = gap.flatMap((value, i) => (value === null ? [] : [i]));
   let least = Infinity, greatest = -Infinity, spread = 0;
   for (const i of known) { least = Math.min(least, gap[i]); greatest = Math.max(greatest, gap[i]); spread += (high[i] - gap[i]) / 2; }
@@ -38,7 +38,7 @@ function frameAt(time) {
 // Frames that the ruler marks, in order: for the keys that go from mark to mark.
 export function marks() {
   const now = playback(), found = new Set(turning.map((i) => gaps.frame[i]));
-  for (const run of failures(-Infinity, Infinity)) found.add(gaps.frame[run.end - run.count + 1]);
+  for (const run of failing) found.add(run.first_frame);
   for (const frame of (now && now.range) || []) found.add(frame);
   return [...found].sort((a, b) => a - b);
 }
@@ -47,7 +47,7 @@ function draw() {
   if (!now || !wide) return;
   const shown = `${wide} ${now.frames} ${now.range} ${devicePixelRatio} ${colour("--ink")}`;
   if ((!dirty && shown === last) || performance.now() - drawnAt < DRAWN_EVERY_MS) return;
-  if (dirty) turning = turningPoints(gaps);
+  if (dirty) { turning = turningPoints(gaps); failing = allFailures(); }
   dirty = false; last = shown; drawnAt = performance.now();
   canvas.width = wide * devicePixelRatio;
   canvas.height = HIGH_PX * devicePixelRatio;
@@ -63,18 +63,18 @@ function draw() {
   }
   seconds(ink, now, wide, place);
   ink.fillStyle = colour("--bad");
-  for (const run of failures(-Infinity, Infinity)) {
-    const from = place(gaps.frame[run.end - run.count + 1]), to = place(gaps.frame[run.end]);
+  for (const run of failing) {
+    const from = place(run.first_frame), to = place(run.last_frame);
     ink.fillRect(from - 1, HIGH_PX - MARK_PX, Math.max(3, to - from + 2), MARK_PX);
   }
   ink.fillStyle = colour("--accent");
   for (const i of turning) {
-    const x = place(gaps.frame[i]), up = gaps.gap[i] > gaps.gap[Math.max(0, i - 1)] || gaps.gap[i] > gaps.gap[Math.min(gaps.gap.length - 1, i + 1)];
+    const x = place(gaps.frame[i]), up = gaps.value[i] > gaps.value[Math.max(0, i - 1)] || gaps.value[i] > gaps.value[Math.min(gaps.value.length - 1, i + 1)];
     ink.beginPath();
     ink.moveTo(x - 5, up ? HIGH_PX - 8 : HIGH_PX - 15); ink.lineTo(x + 5, up ? HIGH_PX - 8 : HIGH_PX - 15); ink.lineTo(x, up ? HIGH_PX - 15 : HIGH_PX - 8);
     ink.fill();
   }
-  const words = `Frame. Ruler: ${turning.length} turning points, ${failures(-Infinity, Infinity).length} stretches without a gap${now.range ? ", a marked range" : ""}`;
+  const words = `Frame. Ruler: ${turning.length} turning points, ${failing.length} stretches without a value${now.range ? ", a marked range" : ""}`;
   if (at("scrub").getAttribute("aria-label") !== words) at("scrub").setAttribute("aria-label", words);
 }
 function seconds(ink, now, wide, place) {

@@ -39,6 +39,7 @@ listen("now", (now) => {
   if (status === announcedStatus && time - announcedAt < ANNOUNCED_EVERY_MS) return;
   announcedAt = time;
   announcedStatus = status;
+  if (now && now.status === "not_asked") return;
   const gap = !now || now.gap_mm === null ? `No gap: ${status}.` : `Gap ${(now.gap_mm - now.zero_mm).toFixed(3)} millimetres.`;
   at("announcer").textContent = page.paused ? "" : gap;
 });

@@ -144,6 +144,7 @@ def _as_in_run(folder: Path, about: dict[str, Any], choices: Choices) -> Choices
             below_tip_mm=float(settings["below_tip_mm"]),
             direction=None if tips == "auto" else Direction(tips),
             region=None if box is None else Region(*(int(side) for side in box)),
+            fingers=choices.fingers,
         )
     except FingervisionError:  # a file that exists but is no calibration
         raise

@@ -10,7 +10,8 @@ from fingervision.live.choices import Choices
 from fingervision.storage.gaps_csv import GapRow, GapsReader
 
 # Exit codes of `measure` after which the table is complete: done, no frame has a gap, some frames are damaged.
-WHOLE = (0, 1, 3)
+NO_GAP = 1
+WHOLE = (0, NO_GAP, 3)
 GAPS = "gaps.csv"
 
 
@@ -28,7 +29,7 @@ def arguments_of(recording: str, choices: Choices, more: tuple[str, ...]) -> tup
     """
     given: list[str] = []
     for name, value in choices.settings().items():
-        if value not in (None, "auto"):
+        if value is not None:
             words = ",".join(map(str, value)) if isinstance(value, list) else str(value)
             given += [f"--{name.replace('_', '-')}", words]
     return ("measure", recording, *given, *more)
@@ -76,8 +77,12 @@ class Track:
         self._command.stop()
         self._command = None
         self.is_whole = ended in WHOLE and bool(self.rows) and self.table.is_file()
-        if not self.is_whole or ended == 1:
+        if not self.is_whole:
             self.failure = complaint or f"Measuring ended with exit code {ended}."
+        elif ended == NO_GAP and not self.counts[Status.NOT_ASKED]:
+            # The command's own sentence is for its user: it names the folder, which is hidden here.
+            counts = ", ".join(f"{number} {status}" for status, number in self.counts.most_common())
+            self.failure = f"Too few frames have a gap: {counts}."
         return is_other
 
     def close(self) -> None:
