@@ -1,7 +1,7 @@
 """The whole diagnosis: locate the disagreement, name the missing effects, and assess the residual."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from fingervision.diagnosis.inference.explanation_candidates import Progress, si
 from fingervision.diagnosis.inference.held_out_prediction import foretold
 from fingervision.diagnosis.inference.hypothesis import Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.measuring_chain import Settings
 from fingervision.diagnosis.inference.plausibility import (
     UNRELATED,
     mistaken_beside_effects,
@@ -178,6 +179,8 @@ class Diagnosis(ShortRepr):
         Results from the poses of bodies, if there are any.
     left_out : tuple of int
         Isolated outliers, which the verdict does not count.
+    answer : Settings
+        Everything that the search found: effects with parameters and start states, and the curve of a map.
     """
 
     report: DiagnosisReport
@@ -187,6 +190,7 @@ class Diagnosis(ShortRepr):
     positioning: PositioningReport | NoRepeatedTargets
     bodies: BodyEvidence | None = None
     left_out: tuple[int, ...] = ()
+    answer: Settings = field(default_factory=dict)
 
 
 def diagnose(
@@ -268,7 +272,8 @@ def _explained(
     answered = judged(data, found if forced else foretold(data, found))
     report = diagnosis_report(answered, refitted.posterior, mistake, forced, rng, begin_s)
     progress(1.0)
-    positioning = positioning_of_data(answered.data, answered.values())
+    answer = answered.values()
+    positioning = positioning_of_data(answered.data, answer)
     return Diagnosis(
         report,
         answered.data,
@@ -276,6 +281,7 @@ def _explained(
         answered.after_mm,
         positioning,
         left_out=answered.stands.left_out,
+        answer=answer,
     )
 
 

@@ -127,6 +127,8 @@ class MeasuredTable(ShortRepr):
         if the times are not rounded.
     channels : mapping of str to Channel
         User-named columns, such as `right_finger.angle_mrad`.
+    followed : str
+        Name of the channel that stands for the gap, and is in `gap_mm`; empty for the gap itself.
     """
 
     input_mm: NDArray[np.float64]
@@ -144,6 +146,7 @@ class MeasuredTable(ShortRepr):
     log: DriveHistory | None = None
     stamp_s: float = 0.0
     channels: Mapping[str, Channel] = field(default_factory=lambda: MappingProxyType({}))
+    followed: str = ""
 
     @property
     def path_rows(self) -> NDArray[np.intp]:

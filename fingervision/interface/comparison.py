@@ -21,7 +21,7 @@ from fingervision.diagnosis.report.paper_figure import WIDTHS_MM, paper_figure
 from fingervision.domain.report import Place
 from fingervision.interface.argument_checks import speaks_python, whole_number
 from fingervision.interface.notebook import cell_html, save_results
-from fingervision.interface.tables import measured_given, models_given
+from fingervision.interface.tables import followed_given, measured_given, models_given
 from fingervision.storage.out_folder import mark_owner, out_folder
 from fingervision.storage.provenance import Provenance, provenance
 
@@ -215,8 +215,9 @@ def compare(
     ()
     """
     seed = whole_number("seed", seed, 0)
-    table = measured_given(measured, columns)
-    models = models_given(model, kind, columns)
+    followed = followed_given(measured, model)
+    table = measured_given(measured, columns, followed)
+    models = models_given(model, kind, columns, followed)
     files = table.files("measured table", columns)
     for name, given in models.items():
         files |= given.files(f"model {name}", columns)

@@ -23,7 +23,7 @@ from fingervision.interface.argument_checks import speaks_python, whole_number
 from fingervision.interface.notebook import cell_html, save_results
 from fingervision.interface.own_effect import added
 from fingervision.interface.progress import shown
-from fingervision.interface.tables import effect_names, measured_given, model_given, own_base
+from fingervision.interface.tables import effect_names, followed_given, measured_given, model_given, own_base
 from fingervision.models.corrected import CorrectedModel
 from fingervision.storage.out_folder import mark_owner, out_folder
 from fingervision.storage.provenance import Provenance, provenance
@@ -236,8 +236,8 @@ def diagnose(
             raise ArgumentError(
                 "with_effects", "not hold an effect that without_effects excludes", f"{both} is in both"
             )
-        table = measured_given(measured, columns)
-        given = model_given(model, kind, columns)
+        followed = followed_given(measured, model)
+        table, given = measured_given(measured, columns, followed), model_given(model, kind, columns, followed)
         made = provenance({**table.files("measured table", columns), **given.files("model", columns)}, call)
         with shown(progress, "Diagnosing") as show:
             told: dict[str, Any] = {} if show is None else {"progress": show}

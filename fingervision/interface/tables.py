@@ -21,6 +21,7 @@ from fingervision.models.function_model import FunctionModel, model_file
 from fingervision.models.kinds import kinds
 from fingervision.models.table import TableModel
 from fingervision.tables import read as tables
+from fingervision.tables.followed_channel import followed_channel
 from fingervision.tables.mapping import NAME, entry_for
 
 TABLES = ("measured", "drive", "simulation")
@@ -153,7 +154,19 @@ class Given:
         return found
 
 
-def measured_given(measured: Any, columns: Any = None) -> Given:
+def followed_given(measured: Any, model: Any) -> str:
+    """Name of the channel that stands for the gap where one of two files has none; else empty.
+
+    Raises
+    ------
+    FingervisionError
+        A file cannot be read.
+    """
+    are_files = all(isinstance(each, str | os.PathLike) for each in (measured, model))
+    return followed_channel(Path(measured), Path(model)) if are_files else ""
+
+
+def measured_given(measured: Any, columns: Any = None, followed: str = "") -> Given:
     """Interpret an argument as a measured table: a file, a measurement with a drive, a MeasuredTable, or columns.
 
     Raises
@@ -165,6 +178,8 @@ def measured_given(measured: Any, columns: Any = None) -> Given:
     """
     if isinstance(measured, str | os.PathLike):
         path = path_of("measured", measured, "a measured table's file")
+        if followed:
+            return Given(tables.read_measured_table(path, followed=followed), path)
         return Given(read_table(path, "measured", columns), path)
     if isinstance(measured, MeasuredTable):
         table = measured
@@ -175,7 +190,7 @@ def measured_given(measured: Any, columns: Any = None) -> Given:
     return Given(table, _name_of("table", table.input_mm, table.gap_mm))
 
 
-def model_given(model: Any, kind: str, columns: Any = None) -> Given:
+def model_given(model: Any, kind: str, columns: Any = None, followed: str = "") -> Given:
     """Interpret an argument as a model: a file, a function, a CorrectedModel, a Diagnosis, or columns of a table.
 
     Raises
@@ -187,6 +202,8 @@ def model_given(model: Any, kind: str, columns: Any = None) -> Given:
     """
     if isinstance(model, str | os.PathLike):
         path = model_file(path_of("model", model, "a model's file"))
+        if followed:
+            return Given(tables.read_model(path, one_of("kind", kind, kinds()), followed=followed), path)
         return Given(read_model(path, kind, columns), path)
     model = getattr(model, "corrected_model", model)
     if callable(model):
@@ -207,7 +224,7 @@ def model_given(model: Any, kind: str, columns: Any = None) -> Given:
     return model_given(simulation_from_columns(columns_of("model", model, must)), kind)
 
 
-def models_given(model: Any, kind: str, columns: Any = None) -> dict[str, Given]:
+def models_given(model: Any, kind: str, columns: Any = None, followed: str = "") -> dict[str, Given]:
     """Interpret an argument as one or more models: one, a list, or a mapping by name; each as in `model_given`.
 
     Raises
@@ -219,7 +236,7 @@ def models_given(model: Any, kind: str, columns: Any = None) -> dict[str, Given]
         named = {str(name): model_given(each, kind, columns) for name, each in model.items()}
     else:
         listed = list(model) if isinstance(model, list | tuple) else [model]
-        given = [model_given(each, kind, columns) for each in listed]
+        given = [model_given(each, kind, columns, followed) for each in listed]
         named = dict(zip(told_apart([each.path for each in given]), given, strict=True)) if given else {}
     if not named:
         raise ArgumentTypeError("model", "be at least one model", "is none")

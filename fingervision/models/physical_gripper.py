@@ -167,16 +167,18 @@ class MechanismModelOfGap:
     kind : str
         Kind of model that computes the gap; predictions for changed hinges, links and bodies always come from the
         lumped model.
+    followed : str
+        Displacement of a body that stands for the gap, such as `lever.y_mm`; empty for the gap itself.
 
     Raises
     ------
     FingervisionError
-        If the mechanism has no probe pair named `gap`.
+        If the mechanism has no probe pair named `gap` and nothing stands for it.
     """
 
-    def __init__(self, mechanism: Mechanism, kind: str) -> None:
-        self.mechanism = mechanism
-        if GAP not in mechanism.pairs:
+    def __init__(self, mechanism: Mechanism, kind: str, followed: str = "") -> None:
+        self.mechanism, self.followed = mechanism, followed
+        if GAP not in mechanism.pairs and not followed:
             raise DataError(
                 f"{mechanism.name} must have a pair of probes called {GAP} to be compared with a measured gap, but has "
                 f'{", ".join(mechanism.pairs) or "none"}: add [[pair]] name = "{GAP}" with of = [two probes].'
@@ -194,12 +196,18 @@ class MechanismModelOfGap:
             max([-reach, *(at for at in touches if at < 0.0)]),
             min([reach, *(at for at in touches if at > 0.0)]),
         )
-        first, last = mechanism.pairs[GAP]
-        apart = np.subtract(mechanism.probes[last], mechanism.probes[first])
-        self._rest_mm, way = rest.pairs_mm[GAP], apart / np.hypot(*apart)
-        self._left, self._right = (
-            float(np.subtract(state.probes_mm[name], rest.probes_mm[name]) @ way) for name in (first, last)
-        )
+        if followed:
+            body, _, part = followed.rpartition(".")
+            at_rest, moved = (getattr(each.bodies[body], part) for each in (rest, state))
+            self._rest_mm, self._right = at_rest, 0.5 * (moved - at_rest)
+            self._left = -self._right
+        else:
+            first, last = mechanism.pairs[GAP]
+            apart = np.subtract(mechanism.probes[last], mechanism.probes[first])
+            self._rest_mm, way = rest.pairs_mm[GAP], apart / np.hypot(*apart)
+            self._left, self._right = (
+                float(np.subtract(state.probes_mm[name], rest.probes_mm[name]) @ way) for name in (first, last)
+            )
         self._force_n = rest.force_n, state.force_n - rest.force_n
 
     def respond(self, input_mm: Array) -> Response:

@@ -1,6 +1,7 @@
 """Reader of measured tables: CSV files with `input_mm,gap_mm` and further recorded columns, such as gaps.csv."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -57,8 +58,15 @@ MOST_RUNS = 1000
 NUMBERS = ("input_mm", "gap_mm", "time_s", "left_mm", "right_mm", "u_gap_mm", "u_random_mm", "force_n")
 
 
-def read_measured_table(path: Path) -> MeasuredTable:
+def read_measured_table(path: Path, followed: str = "") -> MeasuredTable:
     """Read a measured table; rows with an input but no gap are kept as its path, rows without an input are omitted.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    followed : str
+        Name of a channel that stands for the gap; empty for the gap itself.
 
     Raises
     ------
@@ -66,8 +74,10 @@ def read_measured_table(path: Path) -> MeasuredTable:
         A column is missing, a cell is not a number, there are fewer than five rows, the input or the gap never changes,
         or times repeat within a run.
     """
-    table = read_columns(path, NUMBERS[:2], NUMBERS[2:], ("run",), lambda names: channel_names(names, NUMBERS))
-    values = {name: table.numbers(name) for name in NUMBERS if name in table}
+    needed: tuple[str, ...] = (NUMBERS[0], followed) if followed else NUMBERS[:2]
+    others: tuple[str, ...] = ("time_s", "force_n") if followed else NUMBERS[2:]
+    table = read_columns(path, needed, others, ("run",), lambda names: channel_names(names, NUMBERS))
+    values = {name: table.numbers(name) for name in (*needed, *others) if name in table}
     channels: dict[str, Numbers] = {}
     said = []
     for name in channel_names(list(table.columns), NUMBERS):
@@ -75,7 +85,18 @@ def read_measured_table(path: Path) -> MeasuredTable:
             channels[name] = table.numbers(name)
         except DataError as error:
             said.append(f"the column {name} was left out: {error}")
-    return measured_rows(path, values, table.texts("run"), said, channels=channels)
+    if followed:
+        values["gap_mm"] = values.pop(followed)
+        for u in (f"{prefix}{followed}" for prefix in U_PREFIXES):
+            if u in channels:
+                values.setdefault("u_random_mm", channels[u])
+        said.append(
+            f"the table or the model has no gap: {followed}, the displacement of a body that moves most, is compared "
+            "in its place, and is meant wherever a gap is named; a constant difference from the model may be an error "
+            "of the drawing's place in the picture."
+        )
+    found = measured_rows(path, values, table.texts("run"), said, channels=channels)
+    return replace(found, followed=followed)
 
 
 def measured_rows(

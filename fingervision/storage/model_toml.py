@@ -25,8 +25,10 @@ from fingervision.storage.plain_file import in_utf8, toml_lines
 from fingervision.storage.simulation_table import read_simulation_table
 from fingervision.storage.toml_section import Section, read_section
 
-FMU_KEYS = ("input", "gap", "input_unit", "gap_unit")
-"""Keys of an FMU: names of its input and gap, and their units where the FMU declares none."""
+FOLLOWED = "gap"
+FMU_KEYS = ("input", FOLLOWED, "input_unit", "gap_unit")
+"""Keys of an FMU: names of its input and gap, and their units where the FMU declares none. For the drawing of a
+mechanism, `gap` is the displacement of a body that stands for the gap."""
 POINTS = "points"
 """Key of the curve of a position error map: pairs of input and error, in mm."""
 # A fitted value at a bound may exceed the bound by a rounding error.
@@ -38,6 +40,7 @@ def read_model(
     kind: str = "lumped",
     inside: tuple[Path, ...] = (),
     table: Callable[[Path], TableModel] = read_simulation_table,
+    followed: str = "",
 ) -> CorrectedModel:
     """Read a model: a simulation table or a gripper drawing (without effects), or a corrected model.
 
@@ -51,6 +54,8 @@ def read_model(
         Corrected models that have this model as their base.
     table : callable
         Function that reads simulation tables; by default, only tables in fingervision's own format can be read.
+    followed : str
+        Displacement of a body that stands for the gap of a mechanism, such as `lever.y_mm`; empty for the gap itself.
 
     Raises
     ------
@@ -64,7 +69,7 @@ def read_model(
         return CorrectedModel(simulation.name, simulation, str(path), simulation.input_range_mm, {})
     top = read_section(path, "model")
     if "base" not in top.values:
-        return _gripper(path, kind)
+        return _gripper(path, kind, followed)
     top.schema(1, 1)
     place = path.resolve()
     if place in inside:
@@ -72,8 +77,9 @@ def read_model(
     named = top.word("base")
     if not named.strip() or "\0" in named:
         top.refuse("base", f"must be the name of a file, but is {named!r}: correct it.")
-    base = read_model(path.parent / named, top.word("kind", kind), (*inside, place), table)
     names = {key: top.word(key) for key in FMU_KEYS if key in top.values}
+    of_body = names.get(FOLLOWED, followed)
+    base = read_model(path.parent / named, top.word("kind", kind), (*inside, place), table, of_body)
     if names and isinstance(base.base, FunctionModel):
         base = replace(base, base=FunctionModel(base.base.path, {**base.base.names, **names}))
     effects = {**base.effects, **dict(map(_effect, top.tables("effect")))}
@@ -111,12 +117,12 @@ def _function(path: Path, names: Mapping[str, str]) -> CorrectedModel:
     return CorrectedModel(path.name, FunctionModel(path, names), str(path), everywhere, {})
 
 
-def _gripper(path: Path, kind: str) -> CorrectedModel:
+def _gripper(path: Path, kind: str, followed: str) -> CorrectedModel:
     """Build a gripper model that computes mechanism effects by physical laws."""
     if kind not in kinds():
         raise DataError(f"The kind of model for {path} must be one of {', '.join(kinds())}, but is {kind}: choose one.")
     if is_mechanism(path):
-        drawn = MechanismModelOfGap(read_mechanism(path), kind)
+        drawn = MechanismModelOfGap(read_mechanism(path), kind, followed)
         return CorrectedModel(f"{path.name} ({kind})", drawn, str(path), drawn.input_range_mm, {}, kind)
     gripper = PhysicalGripper(read_gripper(path), kind)
     return CorrectedModel(f"{path.name} ({kind})", gripper, str(path), gripper.input_range_mm, {}, kind)

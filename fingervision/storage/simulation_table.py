@@ -31,8 +31,15 @@ def pose_columns(bodies: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray
     return {f"{name}.{part}": rows[:, place] for name, rows in bodies.items() for place, part in enumerate(POSE)}
 
 
-def read_simulation_table(path: Path) -> TableModel:
+def read_simulation_table(path: Path, followed: str = "") -> TableModel:
     """Read a simulation table as a model.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    followed : str
+        Name of a column that stands for the gap; empty for the gap itself.
 
     Raises
     ------
@@ -40,8 +47,10 @@ def read_simulation_table(path: Path) -> TableModel:
         A column is missing, a cell is empty, there are fewer than two rows, an input occurs twice, or the gap is the
         same at all inputs.
     """
-    table = read_columns(path, COLUMNS[:2], COLUMNS[2:])
-    return simulation_rows(path, {name: table.numbers(name, complete=True) for name in COLUMNS if name in table})
+    needed, others = ((COLUMNS[0], followed), COLUMNS[-1:]) if followed else (COLUMNS[:2], COLUMNS[2:])
+    table = read_columns(path, needed, others)
+    columns = {name: table.numbers(name, complete=True) for name in (*needed, *others) if name in table}
+    return simulation_rows(path, {"gap_mm" if name == followed else name: each for name, each in columns.items()})
 
 
 def simulation_rows(path: Path, columns: Mapping[str, Numbers]) -> TableModel:

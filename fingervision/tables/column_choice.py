@@ -20,7 +20,7 @@ from fingervision.tables.mapping import Entry
 from fingervision.tables.questions import Question, Reading, asked
 from fingervision.tables.raw_table import RawColumn, RawTable
 from fingervision.tables.times import looks_like_time
-from fingervision.tables.units import DIMENSION, ColumnName, column_name, factor, spelled
+from fingervision.tables.units import DIMENSION, LENGTHS, ColumnName, column_name, factor, spelled
 from fingervision.tables.words import tokens
 
 NEEDED = {"measured": ("input", "gap"), "drive": ("time", "input"), "simulation": ("input", "gap")}
@@ -107,9 +107,15 @@ def choose(raw: RawTable, names: Sequence[ColumnName], kind: str, given: Entry, 
             listed = ", ".join(f"'{raw.columns[k].name}'" for k in free[:12]) + (" ..." if len(free) > 12 else "")
             words = f"no column has a usual name for the {role} (the columns are {listed or 'taken'})"
             key = f"columns.{role}=NAME"  # without readings, no column of this table can answer
-            found = readings(role, free)
+            found = readings(role, [k for k in free if _can_be(role, names[k])])
             about.questions.append(Question(words, found[0].key if found else key, CANONICAL[role], tuple(found)))
     return chosen
+
+
+def _can_be(role: str, name: ColumnName) -> bool:
+    """Whether a column without a usual name can have a role: no uncertainty, and no other dimension than a length."""
+    is_length = role not in LENGTHS or not name.unit or factor(name.unit, "length") is not None
+    return is_length and not name.text.startswith("u_")
 
 
 def _possible_roles(

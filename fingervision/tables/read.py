@@ -26,7 +26,7 @@ TABLE_ENDINGS = frozenset((*TEXT_ENDINGS, ".mat", ".parquet", ".tdms", ".xls", "
 """File suffixes of tables; a file with another suffix that cannot be read as a table was probably named by mistake."""
 
 
-def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTable:
+def read_measured_table(path: Path, columns: Path | None = None, followed: str = "") -> MeasuredTable:
     """Read a measured table in any format.
 
     Parameters
@@ -35,6 +35,8 @@ def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTabl
         The table.
     columns : Path or None
         A columns.toml; None for that beside the table, if any.
+    followed : str
+        Name of a channel that stands for the gap (`followed_channel`); empty for the gap itself.
 
     Raises
     ------
@@ -44,8 +46,8 @@ def read_measured_table(path: Path, columns: Path | None = None) -> MeasuredTabl
         The table can be interpreted in more than one way.
     """
     given = entry_for(path, "measured", columns)
-    if is_own(path, "measured", given):
-        return measured_table.read_measured_table(path)
+    if followed or is_own(path, "measured", given):
+        return measured_table.read_measured_table(path, followed)
     raw = read_raw(path, given)
     targets = iso230_rows_of(raw, given)
     if targets is not None:
@@ -168,7 +170,7 @@ def _table_or_no_model(path: Path, columns: Path | None) -> TableModel:
         ) from error
 
 
-def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) -> CorrectedModel:
+def read_model(path: Path, kind: str = "lumped", columns: Path | None = None, followed: str = "") -> CorrectedModel:
     """Read a model: a simulation table in any format, a gripper drawing, or a corrected model.
 
     Parameters
@@ -179,6 +181,8 @@ def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) ->
         Kind of model that is built from a gripper drawing.
     columns : Path or None
         A columns.toml for simulation tables; None for that beside the table, if any.
+    followed : str
+        Name of a channel that stands for the gap (`followed_channel`); empty for the gap itself.
 
     Raises
     ------
@@ -186,7 +190,9 @@ def read_model(path: Path, kind: str = "lumped", columns: Path | None = None) ->
         For the same reasons as in `storage.model_toml.read_model` and `read_simulation_table`.
     """
     reader: Callable[[Path], TableModel] = partial(_table_or_no_model, columns=columns)
-    return model_toml.read_model(path, kind, table=reader)
+    if followed:
+        reader = partial(simulation_table.read_simulation_table, followed=followed)
+    return model_toml.read_model(path, kind, table=reader, followed=followed)
 
 
 def _said(table: Understood, given: Entry) -> list[str]:

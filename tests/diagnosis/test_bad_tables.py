@@ -56,23 +56,23 @@ def test_a_wrong_table_is_refused_in_a_sentence(tmp_path: Path, text: str, words
 @pytest.mark.parametrize(
     ("factor", "words"),
     [
-        (1e3, "in micrometres"),
-        (1e-3, "in metres"),
-        (10.0, "in tenths of a millimetre"),
-        (-1.0, "with the opposite sign"),
+        (1e3, "is in micrometres"),
+        (1e-3, "is in metres"),
+        (10.0, "is in tenths of a millimetre"),
+        (-1.0, "has the opposite sign"),
     ],
 )
 def test_inputs_in_another_unit_are_recognised(tmp_path: Path, factor: float, words: str) -> None:
     rows = "\n".join(f"{0.15 * k * factor},{4.0 + 1.155 * k}" for k in range(8))
     table = read_measured_table(write(tmp_path, "input_mm,gap_mm\n" + rows))
-    with pytest.raises(DataError, match=f"as if {words}: correct the column"):
+    with pytest.raises(DataError, match=f"correct the column if it {words}"):
         prepare(table, read_model(write(tmp_path, "input_mm,gap_mm\n-0.1,3.23\n2,19.4", "sim.csv")))
 
 
 def test_exchanged_columns_outside_the_model_are_recognised(tmp_path: Path) -> None:
     rows = "\n".join(f"{0.15 * k},{4.0 + 1.155 * k}" for k in range(8))
     table = read_measured_table(write(tmp_path, "gap_mm,input_mm\n" + rows))
-    with pytest.raises(DataError, match="columns input_mm and gap_mm were exchanged"):
+    with pytest.raises(DataError, match="correct the column if it was exchanged with gap_mm"):
         prepare(table, read_model(write(tmp_path, "input_mm,gap_mm\n-1,-3.7\n2,19.4", "sim.csv")))
 
 

@@ -105,7 +105,7 @@ def body_evidence(
     columns = [table.channels[name].value[rows] for name in names]
     floors = [noise_floor(table.channels[name].value[rows], table.channels[name].u, rows) for name in names]
     drawn = [known[name] for name in names]
-    if GAP in answers.channels:
+    if GAP in answers.channels and not table.followed:
         drawn.append(GAP)
         columns.append(table.gap_mm[rows])
         floors.append(noise_floor(table.gap_mm[rows], table.u_random_mm, rows))
@@ -118,6 +118,11 @@ def body_evidence(
     search = PlaceSearch(prediction, np.stack(columns, axis=1), runs, np.array(floors), timed=table.time_s is not None)
     time_s = None if table.time_s is None else table.time_s[rows]
     return BodyEvidence(prediction, search.run(rng), rows, tuple(names), time_s), tuple(notes)
+
+
+def compared_name(table: MeasuredTable, answers: PlaceAnswers) -> str:
+    """Name, in the drawing, of what the table's gap is: the gap, or the displacement of a body that stands for it."""
+    return known_channels(answers, (table.followed,))[table.followed] if table.followed else GAP
 
 
 def noise_floor(values: Array, u: Array | None, rows: NDArray[np.intp]) -> float:

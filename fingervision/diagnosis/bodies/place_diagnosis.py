@@ -11,6 +11,7 @@ from fingervision.diagnosis.bodies.body_evidence import (
     BodyEvidence,
     added_everywhere,
     body_evidence,
+    compared_name,
     drawing_of,
 )
 from fingervision.diagnosis.bodies.body_prediction import FORCE, BodyPrediction, known_channels
@@ -330,7 +331,7 @@ def _beside_condensed(table: MeasuredTable, model: CorrectedModel, answers: Plac
     bare = model.base.respond(u)
     drawn = answers.answer().by_input
     at = answers.channels.index
-    apart = float(bare.gap_mm[1] - bare.gap_mm[0]) - float(drawn[at(GAP)])
+    apart = float(bare.gap_mm[1] - bare.gap_mm[0]) - float(drawn[at(compared_name(table, answers))])
     changed = replace(table, gap_mm=table.gap_mm + apart * table.input_mm)
     if table.force_n is None or bare.force_n is None:
         return changed
@@ -343,7 +344,7 @@ def _driven_input(done: "Diagnosis") -> Array:
     chain = done.data.chain
     history = chain.along.history
     input_mm = history.input_mm
-    values = {**chain.fixed, **{e.name: {n: p.value for n, p in e.parameters.items()} for e in done.report.effects}}
+    values = {**chain.fixed, **{e.name: done.answer[e.name] for e in done.report.effects if e.name in done.answer}}
     for name, effect in chain.effects.items():
         if name in values and isinstance(effect, DriveEffect) and not effect.curve and effect.in_drawing is None:
             input_mm = effect.act(input_mm, history, values[name])
@@ -352,7 +353,7 @@ def _driven_input(done: "Diagnosis") -> Array:
 
 def _less(table: MeasuredTable, added: Mapping[str, Array], answers: PlaceAnswers) -> MeasuredTable:
     """Subtract the changes that an explanation causes from the channels of a table."""
-    changes: dict[str, object] = {"gap_mm": table.gap_mm - added[GAP]}
+    changes: dict[str, object] = {"gap_mm": table.gap_mm - added[compared_name(table, answers)]}
     if table.midline_mm is not None:
         first, last = answers.mechanism.pairs[GAP_PAIR]
         apart = np.subtract(answers.mechanism.probes[last], answers.mechanism.probes[first])

@@ -73,12 +73,12 @@ UNIT_SHARES = (0.1, 3.0)
 """Smallest and largest share of the model's range that the inputs cover, after a change of unit, if the input was
 apparently given in that unit. Runs cover at least a tenth of the range."""
 UNITS = {
-    "with the opposite sign": -1.0,
-    "in micrometres": 1e3,
-    "in metres": 1e-3,
-    "in tenths of a millimetre": 10.0,
-    "in centimetres": 0.1,
-    "in inches": 1.0 / 25.4,
+    "has the opposite sign": -1.0,
+    "is in micrometres": 1e3,
+    "is in metres": 1e-3,
+    "is in tenths of a millimetre": 10.0,
+    "is in centimetres": 0.1,
+    "is in inches": 1.0 / 25.4,
 }
 """Factors between a column and one in millimetres, with the words for such a column."""
 THOUSANDS = (1e3, 1e-3)
@@ -148,16 +148,15 @@ def _refuse_other_inputs(table: MeasuredTable, model: CorrectedModel) -> None:
     if far:
         there = model.base.respond(np.linspace(low, high, MODEL_POINTS)).gap_mm
         if _within(input_mm, there.min(), there.max()).all() and _within(table.gap_mm, low, high).all():
-            mistakes = ["the columns input_mm and gap_mm were exchanged"]
-    if mistakes:
+            mistakes = ["was exchanged with gap_mm"]
+    if mistakes or outside.any():
+        is_drawn = hasattr(type(model.base), "places")
+        ends = ", where a flexure yields or parts touch" if is_drawn else ""
+        advice = ["leave those rows out", *(f"correct the column if it {words}" for words in mistakes)]
+        advice = advice if is_drawn else ["simulate the missing inputs", *advice]
         raise DataError(
-            f"input_mm must be in millimetres within the model's {low:g} to {high:g}, but runs from {runs}, as if "
-            f"{' or '.join(mistakes)}: correct the column."
-        )
-    if outside.any():
-        raise DataError(
-            f"input_mm must lie within the model's {low:g} to {high:g} mm, but runs from {runs}: simulate the missing "
-            "inputs, or leave those rows out."
+            f"input_mm must lie within the model's {low:g} to {high:g} mm{ends}, but runs from {runs}: "
+            f"{', or '.join(advice)}."
         )
 
 

@@ -18,7 +18,7 @@ from fingervision.effects.position_error_map import curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import FunctionModel
 from fingervision.storage.beside import measurement_beside
-from fingervision.storage.model_toml import write_model
+from fingervision.storage.model_toml import FOLLOWED, write_model
 from fingervision.storage.provenance import Provenance
 from fingervision.storage.recipe_toml import write_recipe
 from fingervision.storage.summary_json import report_document, write_report
@@ -96,6 +96,8 @@ def write_answer(
     """
     report = done.report
     names = model.base.names if isinstance(model.base, FunctionModel) else None
+    if done.data.table.followed:
+        names = {FOLLOWED: done.data.table.followed}
     write_model(out / MODEL, Path(model.base_path), corrected(done, model).effects, model.kind, names)
     if report.next_run is None:
         (out / NEXT_RUN).unlink(missing_ok=True)
