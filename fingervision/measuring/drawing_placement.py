@@ -182,7 +182,8 @@ def by_silhouette(grey: Array, mechanism: Mechanism, px_per_mm: float, flat: Fla
             "--at X,Y=XMM,YMM for three points."
         )
     top = best[0]
-    others = [entry for entry in best[1:] if entry[0] > top[0] - AS_GOOD]
+    # Two of the first placements may have climbed to the same one.
+    others = [entry for entry in best[1:] if entry[0] > top[0] - AS_GOOD and not _near(entry[1], top[1])]
     if not others:
         return Placed(top[1], top[2], ())
     drawn = silhouette(mechanism, top[1], width, height, step) > 0.5

@@ -196,3 +196,14 @@ def test_a_body_that_looks_alike_is_never_taken_for_one_that_is_hidden(plate: Me
     assert seen[0].poses["shuttle"].status == OK
     assert seen[1].poses["shuttle"].status == seen[1].poses["hinge 2"].status == NOT_FOUND
     assert seen[1].poses["finger"].status == OK
+
+
+def test_a_drawing_that_is_not_symmetric_is_not_called_so() -> None:
+    drawing = Path(__file__).parents[1] / "benchmarks" / "mechanisms" / "films" / "lever_jaw.toml"
+    lever, turned = MechanismPlate(read_mechanism(drawing)), float(np.radians(89.4))
+    around = Placement(13.0, np.zeros(2), turned, False)
+    place = replace(around, origin_px=np.array([400.0, 400.0]) - around.to_px(np.array([[7.0], [18.0]]))[:, 0])
+    grey = np.asarray(frame(lever, 0.0, 0, place, size_px=(800, 800)).pixels, dtype=np.float64)
+    placed = by_silhouette(grey, lever.mechanism, 13.0)
+    assert not placed.notes
+    assert placed.place.angle_rad == pytest.approx(turned, abs=0.02)
