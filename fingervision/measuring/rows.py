@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingervision.domain.drive import DriveHistory
-from fingervision.domain.frame import Frame, LostFrame
+from fingervision.domain.frame import LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
 from fingervision.measuring.gap_budget import bias_shares, gap_budget
 from fingervision.measuring.scale import Scale
@@ -31,11 +31,6 @@ class Result:
     index: int
     time_s: float | None
     outcome: GapMeasurement | NoGap | LostFrame
-
-
-def result_of(item: Frame | LostFrame, outcome: GapMeasurement | NoGap | LostFrame) -> Result:
-    """Keep from a frame and its result what the table needs, without the picture."""
-    return Result(item.index, item.time_s, outcome)
 
 
 @dataclass(frozen=True, slots=True)
