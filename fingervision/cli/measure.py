@@ -46,7 +46,7 @@ Examples:
 Files written to --out:
   gaps.csv      one row per frame: gap with its uncertainty, points, tips, or why there is no value
   summary.json  counts, statistics, settings, scale, what the uncertainty includes and what not
-  gap.png       the gap over time; not with gauges that ask for no gap (see --fingers)
+  gap.png       the gap over time; with --gauges, where the frames show fingers
   drive_log.csv with --drive: the stage's log on the recording's clock, which diagnose reads
   bodies.csv    with --mechanism: pose and status of every body and hinge, frame by frame
   flexures.csv  with --mechanism: thickness and place of every flexure at rest
@@ -68,8 +68,7 @@ Exit codes: 0 done; 1 failed, or fewer than one frame in ten shows fingers; 2 wr
 @fingers_option(
     "none",
     words="; none measures no gap",
-    show_default="auto; none with --gauges without a gap, unless --tips, --roi, --face, --drive, --steps or "
-    "--mechanism is given",
+    show_default="auto",
 )
 @option(
     "--face",
@@ -89,7 +88,7 @@ Exit codes: 0 done; 1 failed, or fewer than one frame in ten shows fingers; 2 wr
     "--gauges",
     type=FILE,
     group=MEASURED,
-    help="Measure user-defined gauges (gauges.toml): edges, lines, circles, marks, patches; see --fingers.",
+    help="Also measure user-defined gauges (gauges.toml): edges, lines, circles, marks, patches.",
 )
 @option(
     "--mechanism",
@@ -145,8 +144,7 @@ def command(
     """Measure the gap between two fingers in RECORDING: a video file, a folder of images, or a glob in quotes.
 
     The gap is the distance between the fingers' inner edges, 0.3 mm below their tips, in every frame, with its standard
-    uncertainty. One of --calibration and --px-per-mm is required. With --gauges, gauges are measured, and the gap only
-    if it is asked for: by a gauge of the kind gap, or by an option about the fingers.
+    uncertainty. One of --calibration and --px-per-mm is required. With --gauges, the picture need not show fingers.
     """
     from fingervision.interface.measure import measure_into
     from fingervision.interface.measuring_task import measuring_task, scale_of

@@ -101,7 +101,7 @@ def measure(
         True bit depth of levels that are stored in 16 bits, if it is not 16.
     fingers : str or None
         Whether the fingers are darker or lighter than the background: auto, dark or light; none measures no gap. By
-        default auto, and none for gauges of which no one is a `gap`, unless `tips`, `roi`, `face` or `drive` is stated.
+        default auto; with gauges, the picture need not show fingers.
     face : str
         Edge of a thick part: front, of the face towards the camera, or outline.
     coding : str

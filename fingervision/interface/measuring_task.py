@@ -16,7 +16,7 @@ from fingervision.frames.array_levels import what_it_is
 from fingervision.gauges.gauge_file import Gauge, read_gauges
 from fingervision.interface.argument_checks import number, one_of, whole_number
 from fingervision.measuring.scale import Scale, check_one_scale, stated_scale
-from fingervision.measuring.task import FINGERS, NO_FINGERS, Task, fingers_asked
+from fingervision.measuring.task import FINGERS, IF_SEEN, NO_FINGERS, Task, fingers_asked
 from fingervision.storage.calibration_json import read_calibration
 from fingervision.storage.response_csv import response_named
 
@@ -104,7 +104,8 @@ def measuring_task(
     drawn = _gauges(gauges)
     if fingers is None:
         described = drive is not None or roi is not None or steps_frame is not None or (tips, face) != ("auto", "front")
-        fingers = fingers_asked(drawn, is_described=described or not drawn)
+        asked = fingers_asked(drawn, is_described=described or not drawn)
+        fingers = IF_SEEN if asked == NO_FINGERS else asked
     elif fingers == NO_FINGERS and drive is not None:
         raise UsageError(
             "--drive needs the gap between fingers, from whose motion the clock offset is found, but --fingers is "

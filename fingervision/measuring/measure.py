@@ -21,7 +21,7 @@ from fingervision.measuring.overlay_video import OverlayVideo
 from fingervision.measuring.rows import Result
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.step_pictures import write_steps
-from fingervision.measuring.task import Task, task_for_frames
+from fingervision.measuring.task import NO_FINGERS, Task, task_for_frames
 from fingervision.motion.clock.clock_offset import ClockOffset
 from fingervision.storage.drive_csv import write_drive_log
 from fingervision.storage.gaps_csv import GapRow, GapsCsv
@@ -141,9 +141,9 @@ def _measured(source: FrameSource, task: Task, out: Path, on_progress: Progress 
         join_drive(folder.gaps, task.drive, clock)
     if (log := log_on_the_recording(clock, task)) is not None:
         write_drive_log(folder.drive_log, log)
-    if task.has_fingers:
-        draw_gap(folder.figure, series, task.drive, clock_drawn(clock, task))
     summary = summary_of(how, task, series, clock, complete=not stopped)
+    if summary["settings"]["fingers"] != NO_FINGERS:
+        draw_gap(folder.figure, series, task.drive, clock_drawn(clock, task))
     if gauges is not None:
         summary["gauges"] = gauges.in_words()
         draw_gauges(folder.gauge_figure, gauges.tallies)

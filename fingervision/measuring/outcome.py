@@ -14,7 +14,7 @@ from fingervision.measuring.drive_clock import in_words as clock_in_words
 from fingervision.measuring.frame_loop import Prepared
 from fingervision.measuring.series import GapSeries
 from fingervision.measuring.summary import summarise
-from fingervision.measuring.task import Task, in_words
+from fingervision.measuring.task import IF_SEEN, NO_FINGERS, Task, in_words
 from fingervision.motion.clock.clock_offset import ClockOffset, NoClockOffset
 from fingervision.motion.drive_at import within_jump
 
@@ -44,6 +44,9 @@ def log_on_the_recording(clock: Clock, task: Task) -> DriveHistory | None:
 def summary_of(how: Prepared, task: Task, series: GapSeries, clock: Clock, *, complete: bool) -> dict[str, Any]:
     """Compose summary.json of a recording; `complete` states whether it was measured to its end."""
     description = how.description
+    if task.fingers == IF_SEEN:
+        has_fingers = series.counts[Status.OK] > 0 and not series.is_chance
+        task = replace(task, fingers="auto" if has_fingers else NO_FINGERS)
     if isinstance(clock, ClockOffset):
         description = replace(description, notes=(*description.notes, sentence(clock), *clock.notes))
     description = replace(description, notes=(*description.notes, *_on_the_log(task, series, clock)))

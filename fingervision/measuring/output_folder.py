@@ -18,6 +18,7 @@ from fingervision.measuring.marked import marked
 from fingervision.measuring.outcome import clock_drawn, log_on_the_recording
 from fingervision.measuring.overlay_video import OverlayVideo
 from fingervision.measuring.step_pictures import write_steps
+from fingervision.measuring.task import NO_FINGERS
 from fingervision.storage.drive_csv import DRIVE_LOG, write_drive_log
 from fingervision.storage.gaps_csv import COLUMNS, GapsCsv
 from fingervision.storage.gauge_files import GaugeRows, GaugesCsv
@@ -203,7 +204,7 @@ def save_measured(
             write_steps(wanted, found.how.settings, folder.steps)
         if (log := log_on_the_recording(found.clock, task)) is not None:
             write_drive_log(folder.drive_log, log)
-        if task.has_fingers:
+        if found.summary["settings"]["fingers"] != NO_FINGERS:
             draw_gap(folder.figure, series, task.drive, clock_drawn(found.clock, task))
         write_summary(folder.summary, found.summary)
     return folder

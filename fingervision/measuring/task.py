@@ -19,8 +19,8 @@ from fingervision.measuring.scale import Scale, field_of_view, scale_for_frames
 from fingervision.vision.flanks import STEEPEST
 from fingervision.vision.pipeline import Settings
 
-NO_FINGERS = "none"
-FINGERS = {"auto": None, "dark": True, "light": False, NO_FINGERS: None}
+NO_FINGERS, IF_SEEN = "none", "if_seen"
+FINGERS = {"auto": None, "dark": True, "light": False, NO_FINGERS: None, IF_SEEN: None}
 """Whether the fingers are dark, by the name that options and files give it; None: found in the pictures."""
 
 
@@ -60,7 +60,8 @@ class Task:
     bits : int or None
         Bit depth of levels stored in 16 bits; None determines it in every frame.
     fingers : str
-        Brightness of the fingers, one of `FINGERS`: auto determines it from the first frames, none asks for no gap.
+        Brightness of the fingers, one of `FINGERS`: auto determines it from the first frames, none asks for no gap, and
+        if_seen asks for it only where the frames show fingers.
     is_outline : bool
         Whether a thick part is measured at its whole outline, side walls included, rather than at its front face.
     steepest : float
@@ -180,7 +181,9 @@ def task_for_frames(task: Task, description: Description) -> Task:
             f"{region.x_px},{region.y_px},{region.width_px},{region.height_px} (first column, row, width, height)."
         )
     below_px = task.below_tip_mm * task.scale.px_per_mm
-    if task.has_fingers and below_px >= max(width_px, height_px):
+    if task.fingers == IF_SEEN and below_px >= max(width_px, height_px):
+        task = replace(task, fingers=NO_FINGERS)
+    elif task.has_fingers and below_px >= max(width_px, height_px):
         raise UsageError(
             f"--below-tip-mm must lie within the picture of {width_px}x{height_px} pixels, but "
             f"{task.below_tip_mm:g} mm are {below_px:.0f} px at {task.scale.px_per_mm:g} px/mm, at which the picture "

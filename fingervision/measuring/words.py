@@ -18,9 +18,10 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
     The gauges have their own sentences in front of the advice.
     """
     gap = summary["gap"]
+    has_fingers = summary["settings"]["fingers"] != "none"
     lines = [f"{gap['count']} of {series.frames} frames measured."]
-    if summary["settings"]["fingers"] == "none":
-        lines = [f"{series.frames} frames; no gap between fingers was asked for."]
+    if not has_fingers:
+        lines = [f"{series.frames} frames, without a gap between fingers."]
     if gap["count"] and series.is_minority:
         lines = [
             f"Only {gap['count']} of {series.frames} frames {'was' if gap['count'] == 1 else 'were'} measured: the "
@@ -29,7 +30,7 @@ def result_sentences(summary: Mapping[str, Any], series: GapSeries) -> list[str]
     lines += [
         f"  {summary['counts'][status]} {status}, first frame {why['first_frame']}: {why['words']}"
         for status, why in summary["why"].items()
-        if status != Status.NOT_ASKED
+        if has_fingers or status in (Status.DAMAGED, Status.DUPLICATE)
     ]
     if gap["count"]:
         lines.append(f"Gap {gap['least_mm']:.4f} to {gap['greatest_mm']:.4f} mm, mean {gap['mean_mm']:.4f} mm.")

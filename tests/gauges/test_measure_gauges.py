@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from fingervision.cli import cli
+from tests.commands import printed
 from tests.csv_rows import csv_rows
 from tests.gauges.drawn import bar, drawn, half_plane, seen
 
@@ -65,19 +66,30 @@ def test_the_table(tmp_path: Path) -> None:
     assert "bar" in words
 
 
-def test_where_nothing_asks_for_fingers_none_are_measured_and_the_report_is_about_the_gauges(tmp_path: Path) -> None:
-    code, words, out = _measured(tmp_path, EDGE + PAIR, "--rate-hz", "25")
+@pytest.mark.parametrize("given", [(), ("--fingers", "none")])
+def test_where_no_frame_shows_fingers_the_report_is_about_the_gauges(tmp_path: Path, given: tuple[str, ...]) -> None:
+    code, words, out = _measured(tmp_path, EDGE + PAIR, "--rate-hz", "25", *given)
     assert code == 0, words
     assert "finger " not in words
     assert "one_finger" not in words
     assert not (out / "gap.png").exists()
     assert cv2.imread(str(out / "gauges.png")) is not None
-    assert [row["status"] for row in csv_rows(out / "gaps.csv")] == ["not_asked"] * 3
+    assert ({row["status"] for row in csv_rows(out / "gaps.csv")} == {"not_asked"}) == bool(given)
     summary = json.loads((out / "summary.json").read_text())
     assert summary["settings"]["fingers"] == "none"
     assert summary["gauges"]["bar"]["counts"] == {"ok": 3}
     for line in ("3 frames", "Gauge the, edge (edge): 3 of 3 frames", "gauges.png"):
         assert line in words
+
+
+def test_fingers_are_measured_beside_gauges_where_they_are_seen(tmp_path: Path) -> None:
+    gauge = '[[gauge]]\nname = "edge"\nkind = "edge"\nx_px = 320\ny_px = 100\ndirection_deg = 0\nlength_px = 20\n'
+    (tmp_path / "gauges.toml").write_text("schema = 1\n" + gauge)
+    given = ["--px-per-mm", "34", "--gauges", str(tmp_path / "gauges.toml"), "--out", str(tmp_path / "out")]
+    words = printed("measure", "sample_frames/table1", *given)
+    assert words.startswith("17 of 17 frames measured.")
+    assert "Gauge edge" in words
+    assert {row["status"] for row in csv_rows(tmp_path / "out" / "gaps.csv")} == {"ok"}
 
 
 @pytest.mark.parametrize("asks", [("--fingers", "auto"), ("--roi", "0,0,128,96"), ("--tips", "up"), ("--steps", "0")])
