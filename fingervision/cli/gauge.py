@@ -1,13 +1,18 @@
 """`fingervision gauge`: draw user-defined gauges on a recording, in the browser."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from fingervision.cli._command import FILE, MEASURED, PAGE, make_command, option
 from fingervision.cli._options import out_option, port_option, rate_option, where_to_measure
-from fingervision.cli.live import LIVE_FOLDER, choices_of, with_fingers_asked
+from fingervision.cli.live import LIVE_FOLDER, choices_of
 from fingervision.domain.errors import UsageError
+
+if TYPE_CHECKING:
+    from fingervision.live.choices import Choices
 
 EXAMPLES = """
 \b
@@ -77,6 +82,16 @@ def command(
             "`fingervision live CAMERA --gauges FILE`."
         )
     choices = choices_of(None, calibration, (px_per_mm, u_px_per_mm), below_tip_mm, tips, roi)
-    choices = with_fingers_asked(choices, gauges)
+    choices = _with_fingers_asked(choices, gauges)
     showing = Showing(page=True, json_lines=False, way=Access(port=port), record=False, browser=not no_page)
     look_through(recorded(recording, rate_hz, choices, ()), out or LIVE_FOLDER, showing, Beside(), gauges)
+
+
+def _with_fingers_asked(choices: "Choices", gauges: Path) -> "Choices":
+    """Choices that ask for fingers only if the gauges of a file, which need not exist, or the other choices do."""
+    from fingervision.gauges.gauge_file import read_gauges
+    from fingervision.measuring.task import fingers_asked
+
+    drawn = read_gauges(gauges) if gauges.exists() else ()
+    is_described = choices.region is not None or choices.direction is not None
+    return replace(choices, fingers=fingers_asked(drawn, is_described=is_described))

@@ -1,6 +1,5 @@
 """`fingervision live`: show the camera's picture with the measured points, the gap, and the gap over time."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -209,8 +208,6 @@ def command(
 
     beside = Beside(model_path, kind, drive, drive_offset_s or 0.0, allow_motion, gauges)
     choices = choices_of(source, calibration, (px_per_mm, u_px_per_mm), below_tip_mm, tips, roi)
-    if gauges is not None and not (bed_name or model_path or drive or second):
-        choices = with_fingers_asked(choices, gauges)
     if no_page and choices.scale is None:
         raise UsageError(
             "Without the browser page the scale must be given, but is not: add --calibration FILE (made by "
@@ -277,16 +274,6 @@ def choices_of(
         direction=None if tips == "auto" else Direction(tips),
         region=None if box is None else Region(*box),
     )
-
-
-def with_fingers_asked(choices: "Choices", gauges: Path) -> "Choices":
-    """Choices that ask for fingers only if the gauges of a file, which need not exist, or the other choices do."""
-    from fingervision.gauges.gauge_file import read_gauges
-    from fingervision.measuring.task import fingers_asked
-
-    drawn = read_gauges(gauges) if gauges.exists() else ()
-    is_described = choices.region is not None or choices.direction is not None
-    return replace(choices, fingers=fingers_asked(drawn, is_described=is_described))
 
 
 def _drive_options(drive: Path | None, offset_s: float | None) -> tuple[str, ...]:
