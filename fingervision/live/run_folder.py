@@ -34,7 +34,7 @@ from fingervision.storage.run_files import (
 
 GAPS = "gaps.csv"
 RUNS = "????-??-??T??-??-??Z*"
-OF_OUT = ("calibration_*.json", "snapshot_*.png", "live_gaps.csv", "settings.toml")
+OF_OUT = ("calibration_*.json", "snapshot_*.png", "live_gaps.csv", "live_gauges.csv", "settings.toml")
 """Names of the folders of runs, and of the files that a live view writes beside them."""
 
 

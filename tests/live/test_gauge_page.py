@@ -318,9 +318,8 @@ def test_gauges_are_drawn_dragged_typed_and_saved_in_the_page(
     shown(page, "document.querySelector('#gauge_key_y_px').value > 118")
     assert float(page.input_value("#gauge_key_x_px")) == pytest.approx(79, abs=1)
     # Typed, and moved by arrow keys.
-    page.fill("#gauge_key_direction_deg", "0")
-    page.fill("#gauge_key_y_px", "96")
-    page.keyboard.press("Tab")
+    typed(page, "#gauge_key_direction_deg", "0")
+    typed(page, "#gauge_key_y_px", "96")
     page.locator("#gauge_list button").focus()
     page.keyboard.press("ArrowRight")
     page.keyboard.press("Shift+ArrowUp")
@@ -333,15 +332,12 @@ def test_gauges_are_drawn_dragged_typed_and_saved_in_the_page(
     page.locator("#gauge_new_name").press("Enter")
     shown(page, "document.querySelector('#gauge_key_name').value === 'pair'")
     for key, value in (("distance_px", "1"), ("x_px", "180")):
-        page.fill(f"#gauge_key_{key}", value)
-        page.keyboard.press("Tab")
+        typed(page, f"#gauge_key_{key}", value)
     page.locator("#gauge_key_distance_px_why", has_text="must be between 3 and").wait_for()
     assert page.input_value("#gauge_key_distance_px") == "1"
-    page.fill("#gauge_key_distance_px", "30")
-    page.keyboard.press("Tab")
+    typed(page, "#gauge_key_distance_px", "30")
     shown(page, "document.querySelector('#gauge_key_distance_px_why').textContent === ''")
-    page.fill("#gauge_key_name", "the bar")
-    page.keyboard.press("Tab")
+    typed(page, "#gauge_key_name", "the bar")
     words = reads(page, "the bar", "ok")
     assert float(words.split()[1]) == pytest.approx(1.5, abs=0.005), words
     assert findings(page) == []
@@ -429,6 +425,7 @@ def test_each_gauge_has_a_chart_and_all_that_is_saved_has_the_gauges(
     shown(page, "document.querySelectorAll('#gauge_charts figure').length === 4")
     page.locator("#scrub").fill("7")
     page.locator("#gauge_list li", has_text="lean").locator(".good").wait_for()
+    until(lambda: page.evaluate("import('/page/bus.js').then(m => m.page.state.gauges.is_whole)"))
     until(lambda: len(series(page)[0][3]) == FRAMES)
     # One chart for each quantity, with the values of the table and their uncertainty, or why there is none.
     rows = csv_rows(tmp_path / "measured" / "gauges.csv")

@@ -166,7 +166,7 @@ def test_picture_zooms_with_its_overlay_and_frames_are_found_by_number_time_and_
     assert marks == [WIDEST, HIDDEN[0]]
     page.locator("body").press(",")
     is_at(page, WIDEST)
-    assert "1 turning points, 1 stretches without a gap" in page.get_attribute("#scrub", "aria-label")
+    assert "1 turning points, 1 stretches without a value" in page.get_attribute("#scrub", "aria-label")
 
     # From a tenth to eight times the speed.
     speeds = [float(each.rstrip(TIMES)) for each in page.locator("#speed option").all_inner_texts()]
@@ -204,7 +204,7 @@ def test_a_change_is_as_unsure_as_what_grows_with_the_gap(served: str, opened: C
     u_mm = np.sqrt(random_mm**2 + fixed_mm**2 + (relative * gap_mm) ** 2)
     nothing = [None] * gap_mm.size
     columns = {
-        "time": (gap_mm / 3.0).tolist(), "gap": gap_mm.tolist(), "low": (gap_mm - 2 * u_mm).tolist(),
+        "time": (gap_mm / 3.0).tolist(), "value": gap_mm.tolist(), "low": (gap_mm - 2 * u_mm).tolist(),
         "high": (gap_mm + 2 * u_mm).tolist(), "model": nothing, "frame": list(range(gap_mm.size)),
         "status": nothing, "random": [random_mm] * gap_mm.size, "u_difference": nothing,
     }  # fmt: skip

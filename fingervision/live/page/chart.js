@@ -4,7 +4,7 @@ import { gaps, zeroOf } from "/page/series_data.js";
 import { drawFailures } from "/page/chart_failures.js";
 import { decimals, values, wide } from "/page/axis_labels.js";
 
-const WINDOW_S = 30, DRAWN_EVERY_MS = 100, CALM_EVERY_MS = 1000, LEAST_WINDOW_S = 0.02, ZOOM = 1.6, WHEEL = 0.0015;
+const WINDOW_S = 30, DRAWN_EVERY_MS = 100, CALM_EVERY_MS = 1000, REST = 4, LEAST_WINDOW_S = 0.02, ZOOM = 1.6, WHEEL = 0.0015;
 export const view = { chart: null, residual: null, zoomed: false, dirty: false, cursor: -1, pointed: gaps };
 const charts = new Map(); // with the place of each
 
@@ -144,6 +144,7 @@ on("zoom_out", "click", () => zoom(ZOOM));
 listen("start", () => {
   make();
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { make(); tell("recoloured"); });
-  const again = () => { draw(); setTimeout(again, calm.matches ? CALM_EVERY_MS : DRAWN_EVERY_MS); };
+  // Of many long series, drawing leaves most of the time to everything else.
+  const again = () => { const began = performance.now(); draw(); setTimeout(again, Math.max(calm.matches ? CALM_EVERY_MS : DRAWN_EVERY_MS, REST * (performance.now() - began))); };
   again();
 });

@@ -36,6 +36,7 @@ on("save_csv", "click", () => {
   if (isPart()) return;
   if (hasFingers()) download(withToken("/gaps.csv"), "gaps.csv");
   if (gaugeSeries().length) download(withToken("/gauges.csv"), "gauges.csv");
+  else if (!hasFingers()) tell("message", "There is nothing to save yet: draw a gauge.", "refused");
 });
 // The page itself, with the pictures of what the ruler marks, the frame shown, and the ends.
 on("save_page", "click", () => {

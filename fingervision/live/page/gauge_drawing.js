@@ -3,7 +3,7 @@ import { ask, at, listen, page } from "/page/bus.js";
 import { board, change, chosen, isFirst, request, show, tables, told, usual, works } from "/page/gauge_board.js";
 import { dragged, drawn, handles, outline } from "/page/gauge_shapes.js";
 
-const ASK_EVERY_MS = 100, LETTER = 12, POINT = 6, LEAST_PX = 3;
+const ASK_EVERY_MS = 100, LETTER = 12, POINT = 6, NAME_WEIGHT = 20, LEAST_PX = 3;
 at("stage").insertAdjacentHTML("beforeend", '<svg id="gauge_drawing" aria-hidden="true" preserveAspectRatio="none"></svg>');
 const svg = at("gauge_drawing"), SVG = svg.namespaceURI;
 let drag = null, askedAt = 0;
@@ -44,8 +44,8 @@ export function draw() {
     const places = [...(first ? outline(table).flat() : []), ...(reading ? [...reading.zone, ...reading.marks.flat()] : [])];
     if (places.length) named.push([table, reading, boxOf(places), good + is]);
   });
-  const taken = named.map(([, , box]) => box);
-  for (const each of named) taken.push(name(...each, unit, [width, height], taken));
+  const boxes = named.map(([, , box]) => box), names = [];
+  for (const each of named) names.push(name(...each, unit, [width, height], boxes, names));
   if (drag && drag.kind === "new") svg.append(line([drag.from, drag.to], "set chosen"));
   if (first && works() && !drawing.kind) for (const table of tables()) points(table, unit, now && table.name === now.name);
 }
@@ -53,16 +53,17 @@ export function draw() {
 const boxOf = (places) => [[0, Math.min], [1, Math.min], [0, Math.max], [1, Math.max]].map(([k, least]) => least(...places.map((place) => place[k])));
 const shared = (a, b) => Math.max(0, Math.min(a[2], b[2]) - Math.max(a[0], b[0])) * Math.max(0, Math.min(a[3], b[3]) - Math.max(a[1], b[1]));
 // The name of a gauge stands beside it, where it covers least of the gauges and of the names before it.
-function name(table, reading, box, kind, unit, [width, height], taken) {
+function name(table, reading, box, kind, unit, [width, height], gauges, names) {
   const text = make("text", { "font-size": (LETTER * unit).toFixed(2), class: kind.trim() }, reading && reading.status !== "ok" ? `${table.name}: ${reading.status.replaceAll("_", " ")}` : table.name);
   svg.append(text);
-  const { width: wide, height: high, y: above } = text.getBBox(), apart = 3 * unit, [left, top, right, bottom] = box;
-  const beside = [right + apart, left - apart - wide].flatMap((x) => [top, bottom - high, top - high, bottom].map((y) => [x, y]));
-  const places = [...beside, [left, top - high - apart], [left, bottom + apart], [left, top - 2 * high - apart], [left, bottom + high + apart]];
+  // Browsers round the width of small letters.
+  const { width: letters, height: high, y: above } = text.getBBox(), apart = 3 * unit, wide = letters + apart, [left, top, right, bottom] = box;
+  const rows = [top, bottom - high, top - high - apart, bottom + apart, top - 2 * high - apart, bottom + high + apart, top - 3 * high - apart, bottom + 2 * high + apart];
+  const places = rows.flatMap((y) => [right + apart, left - apart - wide, ...(y < top - high || y > bottom ? [left] : [])].map((x) => [x, y]));
   let best = null, least = Infinity;
   for (const [x, y] of places) {
     const at_x = Math.max(0, Math.min(x, width - wide)), at_y = Math.max(0, Math.min(y, height - high)), own = [at_x, at_y, at_x + wide, at_y + high];
-    const covered = taken.reduce((sum, each) => sum + shared(own, each), 0);
+    const covered = gauges.reduce((sum, each) => sum + shared(own, each), 0) + names.reduce((sum, each) => sum + NAME_WEIGHT * shared(own, each), 0);
     if (covered < least) { least = covered; best = own; }
   }
   text.setAttribute("x", best[0].toFixed(1));
