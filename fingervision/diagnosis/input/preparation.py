@@ -9,6 +9,7 @@ from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, adm
 from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import DrawingRefit, tangent
 from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynamics
+from fingervision.diagnosis.input.exchanged_sides import facing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.record_nuisances import TurningErrors
 from fingervision.diagnosis.noise.replicates import FEWEST_DEGREES, repeats_in, visits
@@ -97,6 +98,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
     """
     model, function = at_rest_beside(table, model)
     _refuse_other_inputs(table, model)
+    table = facing(table, model.base.respond(table.input_mm))
     recorded = RecordedInput.of(table, model.base, model.input_range_mm)
     history = _history(table, model, recorded)
     if recorded.log is None:
