@@ -67,8 +67,9 @@ def command(
     """Draw gauges on RECORDING (a video, images, a run folder) in the browser page of `fingervision live`.
 
     Gauges are edges, pairs of edges, lines, circles, marks, patches and gaps. On the browser page you draw, drag, type
-    and name the gauges, and save them to a file for `fingervision measure --gauges`. Gauges can be drawn before a scale
-    is known; their values appear once the scale is entered on the browser page.
+    and name the gauges, and save them to a file for `fingervision measure --gauges`. Each gauge is shown over time with
+    its uncertainty. The picture need not show fingers: they are looked for only if a gauge is a gap, or with --tips or
+    --roi. Gauges can be drawn before a scale is known; their values appear once the scale is entered on the page.
     """
     from fingervision.live.access import Access
     from fingervision.live.beside import Beside
