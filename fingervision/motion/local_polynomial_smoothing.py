@@ -121,12 +121,13 @@ CORNER_ROWS = 3
 """Number of rows on either side of a corner that smoothing distorts."""
 
 
-def flattened(input_mm: Array, sigma_mm: float, still: float) -> Array:
+def flattened(input_mm: Array, recorded_mm: Array, sigma_mm: float, still: float) -> Array:
     """Replace the positions during a rest by one position that the neighbouring path does not overshoot.
 
     Smoothing makes corners overshoot by some standard deviations of a row, and a smoothed rest wanders: the modelled
-    play follows each overshoot, and the farthest place of each rest. `still` is the motion from row to row (mm) below
-    which the stage may be at rest; 0 changes nothing.
+    play follows each overshoot, and the farthest place of each rest. A row that was recorded on the far side of the
+    rest is no overshoot but a motion, which turned within the rows of the corner. `still` is the motion from row to row
+    (mm) below which the stage may be at rest; 0 changes nothing.
     """
     if still == 0.0:
         return input_mm
@@ -142,8 +143,9 @@ def flattened(input_mm: Array, sigma_mm: float, still: float) -> Array:
             (slice(max(begin - CORNER_ROWS, 0), begin + CORNER_ROWS), max(begin - 2 * CORNER_ROWS, 0)),
             (slice(end + 1 - CORNER_ROWS, end + 1 + CORNER_ROWS), min(end + 2 * CORNER_ROWS, out.size - 1)),
         ):
-            below = input_mm[far] < level
-            out[rows] = np.minimum(out[rows], level) if below else np.maximum(out[rows], level)
+            way = 1.0 if input_mm[far] < level else -1.0
+            beyond = way * (recorded_mm[rows] - level) > 3.0 * sigma_mm
+            out[rows] = np.where(beyond, out[rows], way * np.minimum(way * out[rows], way * level))
     return out
 
 
@@ -223,5 +225,5 @@ class SmoothedRecord:
             steps = np.abs(np.diff(out[run]))
             # Weighted by the way itself, the mean step is one of a motion, however long the rests are.
             still = STANDS * float(steps @ steps) / max(float(steps.sum()), 1e-300)
-            out[run] = flattened(out[run], self.sigma_mm, still)
+            out[run] = flattened(out[run], self.recorded_mm[run], self.sigma_mm, still)
         return out

@@ -201,7 +201,7 @@ def _levelled(record: SmoothedRecord) -> tuple[Array, float]:
     smooth_mm, runs = record.smooth_mm.copy(), record.runs
     for run in runs:
         still = _standing_step(smooth_mm[run], record.sigma_mm, record.leverage[run])
-        smooth_mm[run] = flattened(smooth_mm[run], record.sigma_mm, still)
+        smooth_mm[run] = flattened(smooth_mm[run], record.recorded_mm[run], record.sigma_mm, still)
     still = _standing_step(smooth_mm, record.sigma_mm, record.leverage)
     for run in runs if record.step_mm > 0.0 else ():
         row = record.time_s[run], record.recorded_mm[run]
