@@ -165,6 +165,20 @@ def test_a_servo_that_lags_far_does_not_hide_a_mistaken_column(tmp_path: Path, g
     assert bool(report.effects) == (gain == 1.0)
 
 
+def test_exchanged_columns_within_the_model_are_asked_about() -> None:
+    # The inverse of a bent curve was named: an offset of the input, a large deflection and another rest gap.
+    rng = np.random.default_rng(5)
+    model_mm = np.linspace(-0.2, 3.0, 65)
+    model = {"input_mm": model_mm, "gap_mm": 0.3 + 0.65 * model_mm + 0.05 * model_mm**2}
+    time_s = 0.1 * np.arange(150)
+    u = 0.7 - 0.6 * np.cos(2.0 * np.pi * time_s / 7.0)
+    gap = np.interp(u, *model.values()) + NOISE_MM * rng.standard_normal(u.size)
+    found = fv.diagnose({"time_s": time_s, "input_mm": gap, "gap_mm": u}, model)
+    assert found.verdict is Verdict.UNKNOWN
+    assert "better if they are exchanged" in found.report.sentence
+    assert fv.diagnose({"time_s": time_s, "input_mm": u, "gap_mm": gap}, model).verdict is Verdict.AGREES
+
+
 def test_an_end_stop_that_holds_a_model_in_micrometres_still_explains_nothing() -> None:
     measured = fv.read_table(SAMPLE / "expected_gaps.csv", "measured")
     simulation = fv.read_table(SAMPLE / "simulation.csv", "simulation")

@@ -76,6 +76,17 @@ def test_exchanged_columns_outside_the_model_are_recognised(tmp_path: Path) -> N
         prepare(table, read_model(write(tmp_path, "input_mm,gap_mm\n-1,-3.7\n2,19.4", "sim.csv")))
 
 
+@pytest.mark.parametrize("exchanged", [True, False])
+def test_exchanged_columns_partly_within_the_model_are_recognised(tmp_path: Path, exchanged: bool) -> None:
+    columns = "gap_mm,input_mm\n" if exchanged else "input_mm,gap_mm\n"
+    inputs = 0.1 * np.arange(8) + (0.0 if exchanged else 0.6)
+    rows = "\n".join(f"{u},{0.5 + 0.77 * u}" for u in inputs)
+    table = read_measured_table(write(tmp_path, columns + rows))
+    with pytest.raises(DataError, match="leave those rows out") as refused:
+        prepare(table, read_model(write(tmp_path, "input_mm,gap_mm\n-0.5,0.115\n1,1.27", "sim.csv")))
+    assert ("correct the column if it was exchanged with gap_mm" in str(refused.value)) == exchanged
+
+
 def test_a_model_that_does_not_cover_the_inputs_is_refused(tmp_path: Path) -> None:
     table = read_measured_table(write(tmp_path, "input_mm,gap_mm\n" + GOOD))
     with pytest.raises(DataError, match=r"must lie within the model's 0 to 0\.5 mm, but runs from 0 to 0\.7"):

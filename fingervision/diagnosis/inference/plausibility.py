@@ -25,6 +25,8 @@ catalogue's scale, lever and input errors together reach 1.3 * 1.3 * 1.2."""
 HALF = 0.5
 """Largest share of the variance of the disagreement and (unless the gap does not follow the input at all) of the gap
 itself that a mistake in the table may leave, if it is the mistake and not an effect that explains the table."""
+MODEL_POINTS = 2000
+"""Number of inputs at which the inverse of the model is interpolated."""
 LEAST_NORM = 1e-6
 """Least share of a play's shape that remains after fitting an offset and a ratio, so that the play is distinguishable
 from these."""
@@ -60,12 +62,22 @@ UNRELATED = (
 """Question about a gap that has nothing to do with the input."""
 
 
+EXCHANGED = (
+    "the columns of input and gap fit the model far better if they are exchanged: check which of them holds the input, "
+    "and whether the model belongs to this measurement."
+)
+"""Question about exchanged columns."""
+ONE_KIND = 2.0 * float(np.log(4.0))
+"""-2 log of the prior probability of a kind of mistake (`_choice`)."""
+
+
 def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Explanation]) -> str | None:
     """Ask about sign or unit of a column, if that alone explains the table far better than any physical explanation.
 
     A mistaken column is a hypothesis beside the effects: the gap follows the model with a gain of -1, of a ratio of
-    units, or of any other size, and no effect acts. It is asked about if it leaves less than half of the variance and
-    if its odds against the most probable explanation by effects are 20 to 1 or more. How large a gain effects may
+    units, or of any other size, or the columns of input and gap are exchanged, and no effect acts. It is asked about if
+    it leaves less than half of the variance and if its odds against the most probable explanation by effects are 20 to
+    1 or more. How large a gain effects may
     cause is part of these odds, by the physical priors of their parameters. A gain of 0 is a gap that has nothing to do
     with the input.
 
@@ -87,14 +99,15 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
     if not any(rival.names for rival in rivals):
         gains = [each for each in gains if each[0] > 0.0 and not 1.0 / LARGEST_RATIO < each[0] < LARGEST_RATIO]
     able = [each for each in gains if _leaves_less(data, problem, each[0] * _moved(data))]
-    tried = [(_cost(data, problem, each[0] * _moved(data), each[1]) + _choice(each[0]), each[0]) for each in able]
+    tried = [(_cost(data, problem, gain * _moved(data), free) + _choice(gain), _asked(gain)) for gain, free in able]
+    following = _exchanged(data)
+    if following is not None and _leaves_less(data, problem, following):
+        tried.append((_cost(data, problem, following, 0) + ONE_KIND, EXCHANGED))
     if not tried:
         return None
-    cost, gain = min(tried)
+    cost, asked = min(tried)
     explaining = [each for each in rivals if not each.names or _explains(data, problem, each)]
-    if cost > _physical(problem, explaining) - STRONG:
-        return None
-    return _asked(gain)
+    return asked if cost < _physical(problem, explaining) - STRONG else None
 
 
 def mistaken_beside_effects(data: Observations, found: Findings, look: Look) -> str | None:
@@ -157,9 +170,10 @@ def _corrected(data: Observations, gain: float) -> Observations:
 def _choice(gain: float) -> float:
     """-2 log of the prior probability of a mistake.
 
-    Three kinds are equally likely beforehand: a column of something else, a sign, and one of many ratios.
+    Four kinds are equally likely beforehand: a column of something else, a sign, exchanged columns, and one of many
+    ratios.
     """
-    return 2.0 * float(np.log(3.0 * (1 if gain in (0.0, -1.0) else 4 * len(UNITS))))
+    return ONE_KIND + (0.0 if gain in (0.0, -1.0) else 2.0 * float(np.log(4.0 * len(UNITS))))
 
 
 def _asked(gain: float) -> str:
@@ -199,6 +213,27 @@ def _moved(data: Observations) -> Array:
     if data.chain.history.force:
         parts[-1] = 0.0
     return parts.ravel()
+
+
+def _exchanged(data: Observations) -> Array | None:
+    """Motion of each channel about its mean if input and gap are exchanged; None if the model does not allow it.
+
+    The recorded gap is then the input, and the recorded input the gap: the column called gap follows the inverse of the
+    model. The other channels follow the model at this input.
+    """
+    low_mm, high_mm = data.model.input_range_mm
+    gap_mm, input_mm = data.table.gap_mm, data.chain.history.input_mm
+    inputs_mm = np.linspace(low_mm, high_mm, MODEL_POINTS)
+    gaps_mm = data.model.base.respond(inputs_mm).gap_mm
+    way = np.sign(gaps_mm[-1] - gaps_mm[0])
+    within = (gap_mm >= low_mm) & (gap_mm <= high_mm) & (input_mm >= gaps_mm.min()) & (input_mm <= gaps_mm.max())
+    if not within.all() or np.any(way * np.diff(gaps_mm) <= 0.0):
+        return None
+    seen = data.model.base.respond(gap_mm)
+    parts = [np.interp(way * input_mm, way * gaps_mm, inputs_mm)]
+    parts += [seen.midline_mm] if data.chain.history.both_edges else []
+    parts += [np.zeros_like(gap_mm)] if data.chain.history.force else []
+    return np.concatenate([part - part.mean() for part in parts])
 
 
 def _constants(data: Observations, problem: Problem) -> Array:

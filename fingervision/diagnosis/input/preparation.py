@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fingervision.diagnosis.inference.evidence import STRONG
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import DrawingRefit, tangent
@@ -147,10 +148,8 @@ def _refuse_other_inputs(table: MeasuredTable, model: CorrectedModel) -> None:
         if UNIT_SHARES[0] < share / abs(factor) < UNIT_SHARES[1]
         and (factor in THOUSANDS or (far and _within(input_mm / factor, low, high).all()))
     ]
-    if far:
-        there = model.base.respond(np.linspace(low, high, MODEL_POINTS)).gap_mm
-        if _within(input_mm, there.min(), there.max()).all() and _within(table.gap_mm, low, high).all():
-            mistakes = ["was exchanged with gap_mm"]
+    if outside.any() and _fit_exchanged(table, model, ~outside):
+        mistakes = ["was exchanged with gap_mm"]
     if mistakes or outside.any():
         is_drawn = hasattr(type(model.base), "places")
         ends = ", where a flexure yields or parts touch" if is_drawn else ""
@@ -160,6 +159,32 @@ def _refuse_other_inputs(table: MeasuredTable, model: CorrectedModel) -> None:
             f"input_mm must lie within the model's {low:g} to {high:g} mm{ends}, but runs from {runs}: "
             f"{', or '.join(advice)}."
         )
+
+
+def _fit_exchanged(table: MeasuredTable, model: CorrectedModel, inside: Flags) -> bool:
+    """Whether the model covers the table with input and gap exchanged, and then fits far better than as it is.
+
+    Parameters
+    ----------
+    inside : ndarray of bool, shape (n,)
+        Rows whose input lies in the model's range; if they are the minority, there is nothing to compare with.
+    """
+    low, high = model.input_range_mm
+    there = model.base.respond(np.linspace(low, high, MODEL_POINTS)).gap_mm
+    if not (_within(table.input_mm, there.min(), there.max()).all() and _within(table.gap_mm, low, high).all()):
+        return False
+    if np.mean(inside) < 0.5:
+        return True
+    here = _left_share(model, table.input_mm[inside], table.gap_mm[inside])
+    exchanged = _left_share(model, table.gap_mm[inside], table.input_mm[inside])
+    # -2 log odds of 20 to 1, with a noise of unknown level in both.
+    return exchanged < 0.5 and float(inside.sum()) * float(np.log(here / max(exchanged, 1e-12))) > STRONG
+
+
+def _left_share(model: CorrectedModel, input_mm: Array, gap_mm: Array) -> float:
+    """Share of the variance of a gap that the model leaves, without its constant."""
+    left_mm = gap_mm - model.base.respond(input_mm).gap_mm
+    return float(np.var(left_mm)) / max(float(np.var(gap_mm)), 1e-300)
 
 
 def _within(values: Array, low: float, high: float) -> Flags:
