@@ -59,8 +59,7 @@ LIVE_FOLDER = Path("live")
     "--gauges",
     type=FILE,
     group=MEASURED,
-    help="File of user-defined gauges, which the browser page shows, measures and edits; it need not exist. The gap is "
-    "measured only if a gauge is a gap, or with --tips, --roi, --model, --drive, --beside or --bed.",
+    help="File of user-defined gauges, which the browser page shows, measures and edits; it need not exist.",
 )
 @option("--list", "list_cameras", is_flag=True, group=CAMERA, help="List the cameras of this computer.")
 @option("--size", metavar="WxH", group=CAMERA, help="Picture size to request from the camera.")
