@@ -18,6 +18,7 @@ from fingervision.domain.response import Response
         (0.0, 0.02, False),
         (1e-4, -0.01, False),  # nearly symmetric: either way needs a fault
         (0.005, -0.02, False),
+        (0.05, 1.0, False),  # a midline that moves by far more than any model says, either way
     ],
 )
 @pytest.mark.parametrize("is_turned", [True, False])

@@ -77,9 +77,8 @@ def mistaken_column(data: Observations, problem: Problem, rivals: Sequence[Expla
     A mistaken column is a hypothesis beside the effects: the gap follows the model with a gain of -1, of a ratio of
     units, or of any other size, or the columns of input and gap are exchanged, and no effect acts. It is asked about if
     it leaves less than half of the variance and if its odds against the most probable explanation by effects are 20 to
-    1 or more. How large a gain effects may
-    cause is part of these odds, by the physical priors of their parameters. A gain of 0 is a gap that has nothing to do
-    with the input.
+    1 or more. How large a gain effects may cause is part of these odds, by the physical priors of their parameters. A
+    gain of 0 is a gap that has nothing to do with the input.
 
     Parameters
     ----------

@@ -9,8 +9,8 @@ from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.response import Response
 
 FAULT, FAULT_SHARE = 0.05, 0.01
-"""Prior probability that the fingers share the opening otherwise than the model says, and how much then (standard
-deviation; `assembly_asymmetry`)."""
+"""Prior probability that the fingers share the opening otherwise than the model says, and how much then (half width of
+a Cauchy distribution, because the size of a fault is hardly known; `assembly_asymmetry`)."""
 OF_MODEL = 0.2
 """Relative standard uncertainty of the share that the model states."""
 CLEARLY = 20.0
@@ -39,7 +39,7 @@ def facing(table: MeasuredTable, bare: Response) -> MeasuredTable:
     if not own > 0.0:
         return table
     straight, exchanged = (_probability(seen - sign * midline, opening, OF_MODEL * own) for sign in (1.0, -1.0))
-    if exchanged < CLEARLY * straight:
+    if not exchanged > CLEARLY * straight:
         return table
     note = (
         "the picture shows the model's left side on the right (upside down, or from behind): left and right are meant "
@@ -54,6 +54,6 @@ def _probability(left: Array, opening: Array, of_model: float) -> float:
     share = float(left @ opening) / moved
     rest = left - share * opening
     variance = float(rest @ rest) / (left.size * moved)
-    widths = [float(np.sqrt(variance + own**2)) for own in (of_model, FAULT_SHARE)]
-    densities = [float(np.exp(-0.5 * (share / width) ** 2)) / width for width in widths]
-    return (1.0 - FAULT) * densities[0] + FAULT * densities[1]
+    small, large = (float(np.sqrt(variance + own**2)) for own in (of_model, FAULT_SHARE))
+    inexact = float(np.exp(-0.5 * (share / small) ** 2)) / (small * float(np.sqrt(2.0 * np.pi)))
+    return (1.0 - FAULT) * inexact + FAULT / (np.pi * large * (1.0 + (share / large) ** 2))
