@@ -11,22 +11,16 @@ from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation,
 from fingervision.diagnosis.inference.search import Look
 from fingervision.diagnosis.inference.search_state import Findings
 from fingervision.diagnosis.inference.verdict import standing_of
+from fingervision.diagnosis.input.column_mistakes import HALF, UNITS, exchanged_gap_mm
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.replicates import resolution
 from fingervision.diagnosis.noise.run_offsets import WhitenedColumns
 from fingervision.domain.effect import Array, Flags
 from fingervision.effects.play_operator import play
 
-UNITS = (10.0, 25.4, 100.0, 1000.0, 1e6)
-"""Ratios of units of length that are confused: powers of ten, and inches."""
 LARGEST_RATIO = 2.03
 """Largest ratio of measured to predicted motion (or its inverse) that effects may cause, where none was fitted: the
 catalogue's scale, lever and input errors together reach 1.3 * 1.3 * 1.2."""
-HALF = 0.5
-"""Largest share of the variance of the disagreement and (unless the gap does not follow the input at all) of the gap
-itself that a mistake in the table may leave, if it is the mistake and not an effect that explains the table."""
-MODEL_POINTS = 2000
-"""Number of inputs at which the inverse of the model is interpolated."""
 LEAST_NORM = 1e-6
 """Least share of a play's shape that remains after fitting an offset and a ratio, so that the play is distinguishable
 from these."""
@@ -217,20 +211,14 @@ def _moved(data: Observations) -> Array:
 def _exchanged(data: Observations) -> Array | None:
     """Motion of each channel about its mean if input and gap are exchanged; None if the model does not allow it.
 
-    The recorded gap is then the input, and the recorded input the gap: the column called gap follows the inverse of the
-    model. The other channels follow the model at this input.
+    The recorded gap is then the input, which the other channels follow.
     """
-    low_mm, high_mm = data.model.input_range_mm
     gap_mm, input_mm = data.table.gap_mm, data.chain.history.input_mm
-    inputs_mm = np.linspace(low_mm, high_mm, MODEL_POINTS)
-    gaps_mm = data.model.base.respond(inputs_mm).gap_mm
-    way = np.sign(gaps_mm[-1] - gaps_mm[0])
-    within = (gap_mm >= low_mm) & (gap_mm <= high_mm) & (input_mm >= gaps_mm.min()) & (input_mm <= gaps_mm.max())
-    if not within.all() or np.any(way * np.diff(gaps_mm) <= 0.0):
+    following_mm = exchanged_gap_mm(data.model.base, data.model.input_range_mm, input_mm, gap_mm)
+    if following_mm is None:
         return None
-    seen = data.model.base.respond(gap_mm)
-    parts = [np.interp(way * input_mm, way * gaps_mm, inputs_mm)]
-    parts += [seen.midline_mm] if data.chain.history.both_edges else []
+    parts = [following_mm]
+    parts += [data.model.base.respond(gap_mm).midline_mm] if data.chain.history.both_edges else []
     parts += [np.zeros_like(gap_mm)] if data.chain.history.force else []
     return np.concatenate([part - part.mean() for part in parts])
 

@@ -5,17 +5,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.inference.evidence import STRONG
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain, admissible
 from fingervision.diagnosis.inference.signatures import start_patterns
 from fingervision.diagnosis.inference.uncertain_dimensions import DrawingRefit, tangent
+from fingervision.diagnosis.input.column_mistakes import refuse_other_inputs
 from fingervision.diagnosis.input.driven_model import at_rest_beside, with_dynamics
 from fingervision.diagnosis.input.exchanged_sides import facing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.input.record_nuisances import TurningErrors
 from fingervision.diagnosis.noise.replicates import FEWEST_DEGREES, repeats_in, visits
-from fingervision.domain.effect import REZEROED, Array, Flags, History
-from fingervision.domain.errors import DataError
+from fingervision.domain.effect import REZEROED, Array, History
 from fingervision.domain.measured_table import MeasuredTable
 from fingervision.domain.model import Model, PhysicalModel
 from fingervision.domain.response import Response
@@ -71,24 +70,6 @@ def screened_rows(table: MeasuredTable, model: Model, rest_gap_mm: float) -> tup
     return out, notes
 
 
-UNIT_SHARES = (0.1, 3.0)
-"""Smallest and largest share of the model's range that the inputs cover, after a change of unit, if the input was
-apparently given in that unit. Runs cover at least a tenth of the range."""
-UNITS = {
-    "has the opposite sign": -1.0,
-    "is in micrometres": 1e3,
-    "is in metres": 1e-3,
-    "is in tenths of a millimetre": 10.0,
-    "is in centimetres": 0.1,
-    "is in inches": 1.0 / 25.4,
-}
-"""Factors between a column and one in millimetres, with the words for such a column."""
-THOUSANDS = (1e3, 1e-3)
-"""Factors that leave no doubt: no run is a thousand times as long as the model's range, or a thousandth of it."""
-MODEL_POINTS = 200
-"""Number of inputs at which the range of the model's gap is computed."""
-
-
 def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str] = frozenset()) -> Observations:
     """Combine a measured table with a model.
 
@@ -98,7 +79,7 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         If the model does not cover the inputs, or the inputs are in another unit.
     """
     model, function = at_rest_beside(table, model)
-    _refuse_other_inputs(table, model)
+    refuse_other_inputs(table, model)
     table = facing(table, model.base.respond(table.input_mm))
     recorded = RecordedInput.of(table, model.base, model.input_range_mm)
     history = _history(table, model, recorded)
@@ -133,64 +114,6 @@ def prepare(table: MeasuredTable, model: CorrectedModel, without: frozenset[str]
         turning=TurningErrors.of(history),
         turns=turns,
     )
-
-
-def _refuse_other_inputs(table: MeasuredTable, model: CorrectedModel) -> None:
-    """Refuse a table whose inputs are in another unit than the model's, or outside the model's range."""
-    input_mm, (low, high) = table.input_mm, model.input_range_mm
-    share, runs = float(np.ptp(input_mm)) / (high - low), f"{input_mm.min():g} to {input_mm.max():g}"
-    outside = ~_within(input_mm, low, high)
-    # A run that is mostly within the range is a right one of which the model covers too little.
-    far = float(np.mean(outside)) > 0.5
-    mistakes = [
-        words
-        for words, factor in UNITS.items()
-        if UNIT_SHARES[0] < share / abs(factor) < UNIT_SHARES[1]
-        and (factor in THOUSANDS or (far and _within(input_mm / factor, low, high).all()))
-    ]
-    if outside.any() and _fit_exchanged(table, model, ~outside):
-        mistakes = ["was exchanged with gap_mm"]
-    if mistakes or outside.any():
-        is_drawn = hasattr(type(model.base), "places")
-        ends = ", where a flexure yields or parts touch" if is_drawn else ""
-        advice = ["leave those rows out", *(f"correct the column if it {words}" for words in mistakes)]
-        advice = advice if is_drawn else ["simulate the missing inputs", *advice]
-        raise DataError(
-            f"input_mm must lie within the model's {low:g} to {high:g} mm{ends}, but runs from {runs}: "
-            f"{', or '.join(advice)}."
-        )
-
-
-def _fit_exchanged(table: MeasuredTable, model: CorrectedModel, inside: Flags) -> bool:
-    """Whether the model covers the table with input and gap exchanged, and then fits far better than as it is.
-
-    Parameters
-    ----------
-    inside : ndarray of bool, shape (n,)
-        Rows whose input lies in the model's range; if they are the minority, there is nothing to compare with.
-    """
-    low, high = model.input_range_mm
-    there = model.base.respond(np.linspace(low, high, MODEL_POINTS)).gap_mm
-    if not (_within(table.input_mm, there.min(), there.max()).all() and _within(table.gap_mm, low, high).all()):
-        return False
-    if np.mean(inside) < 0.5:
-        return True
-    here = _left_share(model, table.input_mm[inside], table.gap_mm[inside])
-    exchanged = _left_share(model, table.gap_mm[inside], table.input_mm[inside])
-    # -2 log odds of 20 to 1, with a noise of unknown level in both.
-    return exchanged < 0.5 and float(inside.sum()) * float(np.log(here / max(exchanged, 1e-12))) > STRONG
-
-
-def _left_share(model: CorrectedModel, input_mm: Array, gap_mm: Array) -> float:
-    """Share of the variance of a gap that the model leaves, without its constant."""
-    left_mm = gap_mm - model.base.respond(input_mm).gap_mm
-    return float(np.var(left_mm)) / max(float(np.var(gap_mm)), 1e-300)
-
-
-def _within(values: Array, low: float, high: float) -> Flags:
-    """Whether each value lies in a range, or at its ends but for rounding; shape (n,)."""
-    slack = 1e-9 * (high - low)
-    return np.asarray((values >= low - slack) & (values <= high + slack))
 
 
 def _history(table: MeasuredTable, model: CorrectedModel, recorded: RecordedInput) -> History:
