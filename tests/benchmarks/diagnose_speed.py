@@ -19,7 +19,7 @@ from fingervision.storage.measured_table import read_measured_table
 from fingervision.storage.model_toml import read_model
 from tests.benchmarks.frame import Namespace, benchmark
 
-BARS_S = {100: 2.0, 2000: 5.0, 20000: 60.0}
+BARS_S = {100: 2.0, 2000: 5.0, 20000: 30.0}
 RATE_HZ = 20.0
 EDGE_MM, INPUT_MM = 0.005, 0.0004
 RUNS = 6
