@@ -40,9 +40,10 @@ Floats = NDArray[np.float64]
 # Standard deviations (pixels) and correlation lengths (pixels along the edge) that are tried. The standard deviations
 # differ by a fifth, the precision with which about thirty waves determine them. A blur of 1 px correlates an edge over
 # 2 sqrt(pi) px, the integral of the correlation for a length of 1.5; shorter lengths would be indistinguishable from
-# white noise. Waves longer than the largest length belong to the finger's shape.
+# white noise. Waves longer than this belong to the finger's shape: a flank that is curved, but no parabola.
 DEVIATIONS_PX = np.geomspace(0.03, 0.9, 18)
 LENGTHS_PX = np.array([1.5, 2.3, 3.5, 5.3, 8.0, 12.0])
+LENGTHS_OF_SHAPE_PX = np.array([18.0, 27.0, 40.0])
 # Number of parameters of each flank (level, slope and curvature), least number of its points, and number of points
 # above which only every second or third point is used.
 OWN, FEWEST_POINTS, MOST_POINTS = 3, 12, 40
@@ -80,7 +81,8 @@ def roughness(
         return None
     if known is not None:
         return known
-    likelihood, seen = np.zeros((DEVIATIONS_PX.size, LENGTHS_PX.size)), 0
+    lengths = np.concatenate([LENGTHS_PX, LENGTHS_OF_SHAPE_PX])
+    likelihood, seen = np.zeros((DEVIATIONS_PX.size, lengths.size)), 0
     nothing = 0.0
     for p, end in zip(points, ends, strict=True):
         is_flank = on_flanks(end.parameters, end.origin, p.x, p.y) & (end.robust > 0.0)
@@ -92,16 +94,17 @@ def roughness(
             seen += 1
             along, across, variance = p.y[chosen], p.x[chosen], p.u[chosen] ** 2
             own = np.empty_like(likelihood)
-            is_sound, none = _likelihood(along, across, variance, DEVIATIONS_PX, LENGTHS_PX, own)
+            is_sound, none = _likelihood(along, across, variance, DEVIATIONS_PX, lengths, own)
             if not is_sound:
                 msg = "the covariance of a flank's points must be positive"
                 raise np.linalg.LinAlgError(msg)
             nothing += none
             likelihood += own
-    if seen and likelihood.max() < nothing + POSSIBLE:
+    rough, shape = likelihood[:, : LENGTHS_PX.size], float(likelihood[:, LENGTHS_PX.size :].max())
+    if seen and rough.max() < max(nothing + POSSIBLE, shape - POSSIBLE):
         return None
-    is_told = bool(likelihood.max() > nothing + SIGNIFICANT)
-    weight = np.exp(likelihood - likelihood.max())
+    is_told = bool(rough.max() > max(nothing + SIGNIFICANT, shape))
+    weight = np.exp(rough - rough.max())
     weight /= weight.sum()
     distance = np.arange(FARTHEST_PX + 1.0)
     covariance = np.zeros(distance.size)
