@@ -40,7 +40,7 @@ Floats = NDArray[np.float64]
 # Standard deviations (pixels) and correlation lengths (pixels along the edge) that are tried. The standard deviations
 # differ by a fifth, the precision with which about thirty waves determine them. A blur of 1 px correlates an edge over
 # 2 sqrt(pi) px, the integral of the correlation for a length of 1.5; shorter lengths would be indistinguishable from
-# white noise. Waves longer than this belong to the finger's shape: a flank that is curved, but no parabola.
+# white noise. Longer waves, tried beside them, belong to the finger's shape: a flank that is curved, but no parabola.
 DEVIATIONS_PX = np.geomspace(0.03, 0.9, 18)
 LENGTHS_PX = np.array([1.5, 2.3, 3.5, 5.3, 8.0, 12.0])
 LENGTHS_OF_SHAPE_PX = np.array([18.0, 27.0, 40.0])

@@ -96,7 +96,7 @@ def looked_through(page: Any, words: list[str], *, has_fingers: bool) -> None:
     # The network camera's fingers point up.
     if has_fingers and "down" not in words:
         shown(page, "Number(document.querySelector('#gap_mm').textContent) > 0")
-    if any(word.endswith(".mp4") for word in words) or any("runs/" in word for word in words):
+    if any(word.endswith(".mp4") or "runs/" in word for word in words):
         shown(page, LAST + " > 0 && document.querySelector('#play').textContent === 'Play'")
         page.locator("body").press("p")
         shown(page, f"{FRAME} === {LAST}")
