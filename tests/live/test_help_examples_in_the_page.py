@@ -104,7 +104,7 @@ def looked_through(page: Any, words: list[str], *, has_fingers: bool) -> None:
         begun = page.evaluate(SHOWN)
         shown(page, f"{SHOWN} > {begun + ENOUGH}")
     if "--model" in words:
-        shown(page, r"/ \d{3} samples/.test(document.querySelector('#model_words').textContent)")
+        shown(page, r"/\b\d{3} samples/.test(document.querySelector('#model_words').textContent)")
 
 
 def ended(view: Any) -> None:
