@@ -1,6 +1,6 @@
 """Physical effects that act between the recorded input and the measured points."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -255,6 +255,8 @@ class Effect:
     drawn_with : mapping of str to float
         Parameter values for the effect's plot in the catalogue, if the usual fraction of the range would not show its
         shape.
+    like_wrong_zero : bool
+        Whether the effect acts like a wrong zero of the encoder: below one step of it, the data cannot tell them apart.
     odd : tuple of str
         Names of parameters that change sign when the picture is mirrored.
     in_picture : callable or None
@@ -297,6 +299,7 @@ class Effect:
     most_together: float = float("inf")
     wave: tuple[str, str] | None = None
     drawn_with: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    like_wrong_zero: bool = False
     odd: tuple[str, ...] = ()
     in_picture: Callable[[Values], PictureForm] | None = None
     at_frames: bool = False
@@ -328,6 +331,24 @@ class Effect:
         own = {p.name: values[p.name] for p in self.parameters if p.name in values}
         scale = min(1.0, self.most_together / max(sum(own.values()), 1e-300))
         return {**values, **{name: scale * value for name, value in own.items()}} if scale < 1.0 else dict(values)
+
+
+def curve_values(inputs_mm: Sequence[float], errors_mm: Sequence[float]) -> dict[str, float]:
+    """Encode the points of an effect that is a curve as parameter values."""
+    out: dict[str, float] = {}
+    for k, (at, error) in enumerate(zip(inputs_mm, errors_mm, strict=True), start=1):
+        out |= {f"point_{k}_input_mm": float(at), f"point_{k}_error_mm": float(error)}
+    return out
+
+
+def curve_points(values: Values) -> tuple[Array, Array]:
+    """Decode inputs and errors of an effect's curve from parameter values, each of shape (k,).
+
+    The arrays are empty if the values encode no curve.
+    """
+    count = sum(key.endswith("_error_mm") for key in values)
+    inputs, errors = ([values[f"point_{k}_{what}_mm"] for k in range(1, count + 1)] for what in ("input", "error"))
+    return np.array(inputs), np.array(errors)
 
 
 def start_key(run: int) -> str:

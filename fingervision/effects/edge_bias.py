@@ -20,6 +20,7 @@ EFFECT = PointEffect(
     source="definition",
     residual="a constant offset of the gap",
     parameters=(Parameter("offset_mm", "mm", -0.1, 0.1, "offset of the measured gap", typical=0.03),),
+    like_wrong_zero=True,
     checks={FurtherCheck.SLOT: True},
     act=act,
 )

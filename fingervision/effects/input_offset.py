@@ -24,6 +24,7 @@ EFFECT = DriveEffect(
     source="definition",
     residual="nearly a constant offset; if the model is curved, proportional to its slope",
     parameters=(Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05),),
+    like_wrong_zero=True,
     checks={FurtherCheck.REZERO: True},
     in_drawing=DrawingForm(
         DrawnPart.CONSTANT, Parameter("offset_mm", "mm", -0.5, 0.5, "offset of the input", typical=0.05)

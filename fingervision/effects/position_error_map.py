@@ -1,11 +1,9 @@
 """Position error map: the stage has a position error that depends on the position but not on the direction."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values
+from fingervision.domain.effect import Array, DriveEffect, History, Stage, Values, curve_points
 from fingervision.domain.parameter import Parameter
 
 FEWEST_PLACES = 5
@@ -35,24 +33,6 @@ def without_line(inputs_mm: Array, read: Array | None = None) -> Array:
     line = np.stack([np.ones_like(inputs_mm), inputs_mm - inputs_mm.mean()], axis=1)
     weight = np.eye(inputs_mm.size) if read is None else read.T @ read
     return np.asarray(np.eye(inputs_mm.size) - line @ np.linalg.solve(line.T @ weight @ line, line.T @ weight))
-
-
-def curve_values(inputs_mm: Sequence[float], errors_mm: Sequence[float]) -> dict[str, float]:
-    """Encode the points of the effect's curve as parameter values."""
-    out: dict[str, float] = {}
-    for k, (at, error) in enumerate(zip(inputs_mm, errors_mm, strict=True), start=1):
-        out |= {f"point_{k}_input_mm": float(at), f"point_{k}_error_mm": float(error)}
-    return out
-
-
-def curve_points(values: Values) -> tuple[Array, Array]:
-    """Decode inputs and errors of the effect's curve from parameter values, each of shape (k,).
-
-    The arrays are empty if the values encode no curve.
-    """
-    count = sum(key.endswith("_error_mm") for key in values)
-    inputs, errors = ([values[f"point_{k}_{what}_mm"] for k in range(1, count + 1)] for what in ("input", "error"))
-    return np.array(inputs), np.array(errors)
 
 
 def typical_curve(low_mm: float, high_mm: float, rms_mm: float, length_mm: float) -> tuple[Array, Array]:

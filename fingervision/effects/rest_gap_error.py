@@ -20,6 +20,7 @@ EFFECT = PointEffect(
     source="definition",
     residual="a constant offset of the gap, the same in all runs",
     parameters=(Parameter("offset_mm", "mm", -2.0, 2.0, "offset of the gap at rest", typical=0.5),),
+    like_wrong_zero=True,
     checks={FurtherCheck.SLOT: False, FurtherCheck.REZERO: False},
     act=act,
 )

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fingervision.domain.effect import effect_key, split_key
+from fingervision.domain.effect import curve_points, curve_values, effect_key, split_key
 from fingervision.domain.errors import DataError, InputFileError
 from fingervision.domain.field import Field
 from fingervision.domain.parameter import Estimate
 from fingervision.effects import catalogue, origin_of
-from fingervision.effects.position_error_map import curve_points, curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import SUFFIXES, FunctionModel
 from fingervision.models.kinds import kinds

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
-from fingervision.domain.effect import start_key
+from fingervision.domain.effect import curve_values, start_key
 from fingervision.effects import catalogue
-from fingervision.effects.position_error_map import curve_values
 from fingervision.testing import EffectContract, NotApplicable, checks_of
 from fingervision.testing.effect_contract import MODEL, bench
 

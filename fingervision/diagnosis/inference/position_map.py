@@ -19,9 +19,9 @@ from fingervision.diagnosis.inference.random_effect import (
     gains_by_size,
     normal_equations,
 )
-from fingervision.domain.effect import Array, History
+from fingervision.domain.effect import Array, History, curve_values
 from fingervision.domain.parameter import Estimate
-from fingervision.effects.position_error_map import EFFECT, covariance, curve_values, without_line
+from fingervision.effects.position_error_map import EFFECT, covariance, without_line
 
 NAME = EFFECT.name
 SET_POINTS = 60

@@ -12,9 +12,8 @@ from fingervision.diagnosis.report.positioning_of_data import positioning_sectio
 from fingervision.diagnosis.report.report_page import SIMULATION, curves_of, report_page
 from fingervision.diagnosis.report.residual_localization import by_channel
 from fingervision.diagnosis.report.sentences import COVERAGE_FACTOR
-from fingervision.domain.effect import effect_key
+from fingervision.domain.effect import curve_values, effect_key
 from fingervision.domain.parameter import Estimate
-from fingervision.effects.position_error_map import curve_values
 from fingervision.models.corrected import CorrectedModel
 from fingervision.models.function_model import FunctionModel
 from fingervision.storage.beside import measurement_beside

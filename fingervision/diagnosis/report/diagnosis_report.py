@@ -76,9 +76,6 @@ def force_hint(data: Observations, alternatives: tuple[Explanation, ...]) -> tup
 
 # Sentence on an offset within one step of the encoder, which may be the encoder's own zero.
 
-OFFSETS = ("input_offset", "rest_gap_error", "edge_bias")
-"""Effects that act like a wrong zero of the encoder."""
-
 
 def encoder_zero(answered: Answer) -> tuple[str, ...]:
     """Sentence on the zero of the encoder, if an offset of less than one step is named, or remains without a name.
@@ -91,7 +88,7 @@ def encoder_zero(answered: Answer) -> tuple[str, ...]:
     if step_mm == 0.0 or (answered.data.position_map is not None):
         return ()
     about = f"one step of the encoder ({1e3 * step_mm:.3g} um)"
-    named = [name for name in OFFSETS if name in best.names]
+    named = [name for name, effect in catalogue().items() if effect.like_wrong_zero and name in best.names]
     if named:
         changed_mm = answered.data.chain.stacked({name: best.values[name] for name in named})
         size_mm = _of_input(answered, changed_mm - answered.data.chain.stacked({}))[0]

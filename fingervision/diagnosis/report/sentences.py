@@ -8,6 +8,7 @@ import numpy as np
 from fingervision.diagnosis.inference.evidence import speaks_for
 from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit
+from fingervision.diagnosis.inference.position_map import NAME
 from fingervision.diagnosis.inference.verdict import UNDECIDED, Standing
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.domain.effect import Array
@@ -162,7 +163,7 @@ def required_words(
     data: Observations, problem: Problem, best: Explanation, forced: frozenset[str], *, mapped: bool
 ) -> tuple[str, ...]:
     """Sentences on effects that the user required: what speaks against each that the data do not show."""
-    kept, said = {*best.names, *(("position_error_map",) if mapped else ())}, []
+    kept, said = {*best.names, *((NAME,) if mapped else ())}, []
     for name in sorted(forced):
         others = " and ".join(sorted(kept - {name}))
         low = f"the odds for it{' beside ' if others else ''}{others} are below 20 to 1"
