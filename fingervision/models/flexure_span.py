@@ -219,12 +219,10 @@ def _alone(flexure: Flexure, region: PlanarRegion, stations: Array) -> NDArray[n
     """Whether, at each position along the axis, the material across the axis is that of the flexure only."""
     half = 0.5 * flexure.height_mm(stations)
     apart = (_BESIDE_FOUND if flexure.found and flexure.is_notch else _BESIDE) * flexure.thickness_mm
-    found = np.ones(stations.size, dtype=bool)
-    for side in (-1.0, 1.0):
-        for beyond, wanted in ((-apart, True), (apart, False)):
-            points = np.stack(flexure.section_mm(stations, side * (half + beyond)))
-            found &= region.holds(points) == wanted
-    return found
+    within, beyond = half - apart, half + apart
+    points = np.stack(flexure.section_mm(np.tile(stations, 4), np.concatenate([-within, within, -beyond, beyond])))
+    held = region.holds(points).reshape(4, -1)
+    return np.asarray(held[0] & held[1] & ~held[2] & ~held[3])
 
 
 def _cut(flexure: Flexure, region: PlanarRegion, side: float, end_mm: float) -> tuple[float, float]:

@@ -118,9 +118,9 @@ def _thinned(at: Array, edge: Array, body_mm: float) -> SizeField:
     kept = np.ones(len(edge), dtype=bool)
     for place in range(len(edge)):
         if kept[place]:
-            near = np.hypot(*(at[place + 1 :] - at[place]).T) * 0.6 * _GROWTH + edge[place] <= edge[place + 1 :]
-            near |= np.hypot(*(at[place + 1 :] - at[place]).T) < 0.5 * edge[place]
-            kept[place + 1 :] &= ~near
+            far = np.hypot(*(at[place + 1 :] - at[place]).T)
+            near = far * 0.6 * _GROWTH + edge[place] <= edge[place + 1 :]
+            kept[place + 1 :] &= ~(near | (far < 0.5 * edge[place]))
     if not kept.any():
         return SizeField(np.zeros((1, 2)), np.array([body_mm]), body_mm)
     return SizeField(at[kept], edge[kept], body_mm)
@@ -129,9 +129,10 @@ def _thinned(at: Array, edge: Array, body_mm: float) -> SizeField:
 def _sizes(curve: Curve, t: Array, others: list[Curve], across: float, body_mm: float, size_mm: float) -> Array:
     at, along = curve.at(t), curve.direction(t)
     inward = np.stack([-along[1], along[0]])
-    width = np.full(t.size, np.inf)
+    width = _ray_lengths(at, inward, [other for other in others if other.v is None], 1e-9 * size_mm)
     for other in others:
-        width = np.minimum(width, _ray_length(at, inward, other, 1e-9 * size_mm))
+        if other.v is not None:
+            width = np.minimum(width, _ray_length(at, inward, other, other.v, 1e-9 * size_mm))
     radius = curve.curvature_radius_mm(t)
     size = np.minimum(width / across, _OF_RADIUS * radius)
     # Bending is spread over sqrt(width radius) along a notch.
@@ -143,17 +144,24 @@ def _lengths(curve: Curve, t: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve.at(t), axis=1)))])
 
 
-def _ray_length(at: Array, towards: Array, other: Curve, least: float) -> Array:
-    """Distance from points to a curve along given directions; infinite where the ray misses the curve."""
+def _ray_lengths(at: Array, towards: Array, segments: list[Curve], least: float) -> Array:
+    """Distance from points to the nearest of the segments along given directions; infinite where there is none."""
+    if not segments:
+        return np.full(at.shape[1], np.inf)
+    origin, u = (np.array([getattr(each, name) for each in segments]).T[:, :, None] for name in ("origin", "u"))
+    apart = at[:, None] - origin
+    cross = towards[0] * u[1] - towards[1] * u[0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        way = -(apart[0] * u[1] - apart[1] * u[0]) / cross
+        t = (towards[0] * apart[1] - towards[1] * apart[0]) / cross
+    hit = (np.abs(cross) > 1e-12 * np.hypot(*u)) & (way > least) & (t >= 0.0) & (t <= 1.0)
+    return np.asarray(np.where(hit, way, np.inf).min(axis=0))
+
+
+def _ray_length(at: Array, towards: Array, other: Curve, v: Array, least: float) -> Array:
+    """Distance from points to an arc with the half axis v along given directions; infinite where the ray misses it."""
     apart = at - other.origin[:, None]
-    if other.v is None:
-        cross = towards[0] * other.u[1] - towards[1] * other.u[0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            way = -(apart[0] * other.u[1] - apart[1] * other.u[0]) / cross
-            t = (towards[0] * apart[1] - towards[1] * apart[0]) / cross
-        hit = (np.abs(cross) > 1e-12 * np.hypot(*other.u)) & (way > least) & (t >= 0.0) & (t <= 1.0)
-        return np.where(hit, way, np.inf)
-    frame = np.column_stack([other.u, other.v])
+    frame = np.array([other.u, v]).T
     a, b = np.linalg.solve(frame, apart), np.linalg.solve(frame, towards)
     square, half, rest = np.sum(b * b, axis=0), np.sum(a * b, axis=0), np.sum(a * a, axis=0) - 1.0
     below = half**2 - square * rest

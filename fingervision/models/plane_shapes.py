@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
 
@@ -22,6 +23,8 @@ separated."""
 _PARALLEL = 1e-12
 _STRAIGHT = 1e-9
 """Bulge below which an arc counts as straight."""
+_AT_ONCE = 1_000_000
+"""Pairs of a side and a point that are looked at together, so that a long outline needs no more than some 10 MB."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,15 +70,15 @@ class Curve:
     def at(self, t: Array) -> Array:
         """Points at given parameters, shape (2, n)."""
         if self.v is None:
-            return np.asarray(self.origin[:, None] + np.outer(self.u, t))
-        return np.asarray(self.origin[:, None] + np.outer(self.u, np.cos(t)) + np.outer(self.v, np.sin(t)))
+            return np.asarray(self.origin[:, None] + self.u[:, None] * t)
+        return np.asarray(self.origin[:, None] + self.u[:, None] * np.cos(t) + self.v[:, None] * np.sin(t))
 
     def direction(self, t: Array) -> Array:
         """Unit tangents in the direction of travel, shape (2, n)."""
         if self.v is None:
             slope = np.repeat(self.u[:, None], len(t), axis=1)
         else:
-            slope = np.outer(self.v, np.cos(t)) - np.outer(self.u, np.sin(t))
+            slope = self.v[:, None] * np.cos(t) - self.u[:, None] * np.sin(t)
         slope = slope * np.sign(self.t1 - self.t0)
         return np.asarray(slope / np.hypot(*slope))
 
@@ -83,7 +86,7 @@ class Curve:
         """Radius of curvature (mm); infinite for a segment."""
         if self.v is None:
             return np.full(len(t), np.inf)
-        first = np.outer(self.v, np.cos(t)) - np.outer(self.u, np.sin(t))
+        first = self.v[:, None] * np.cos(t) - self.u[:, None] * np.sin(t)
         cross = abs(float(self.u[0] * self.v[1] - self.u[1] * self.v[0]))
         return np.asarray(np.sum(first**2, axis=0) ** 1.5 / cross)
 
@@ -99,7 +102,7 @@ class Curve:
         apart = points - self.origin[:, None]
         if self.v is None:
             return np.asarray((self.u[0] * apart[1] - self.u[1] * apart[0]) / np.hypot(*self.u))
-        unit = np.linalg.solve(np.column_stack([self.u, self.v]), apart)
+        unit = np.linalg.solve(np.array([self.u, self.v]).T, apart)
         return np.asarray(np.sum(unit**2, axis=0) - 1.0)
 
     def holds(self, point: Array) -> bool:
@@ -108,7 +111,7 @@ class Curve:
         if self.v is None:
             t = float(apart @ self.u / (self.u @ self.u))
             return min(self.t0, self.t1) - _WITHIN <= t <= max(self.t0, self.t1) + _WITHIN
-        c, s = np.linalg.solve(np.column_stack([self.u, self.v]), apart)
+        c, s = np.linalg.solve(np.array([self.u, self.v]).T, apart)
         low, high = min(self.t0, self.t1), max(self.t0, self.t1)
         turn = float(np.mod(np.arctan2(s, c) - low + _WITHIN, 2.0 * np.pi)) - _WITHIN
         return turn <= high - low + _WITHIN
@@ -136,7 +139,7 @@ def _on_curve(curve: Curve, point: Array) -> list[float]:
         return []
     if curve.v is None:
         return [float((point - curve.origin) @ curve.u / (curve.u @ curve.u))]
-    c, s = np.linalg.solve(np.column_stack([curve.u, curve.v]), point - curve.origin)
+    c, s = np.linalg.solve(np.array([curve.u, curve.v]).T, point - curve.origin)
     return _turned_into(curve, float(np.arctan2(s, c)))
 
 
@@ -153,9 +156,9 @@ def _meetings(curve: Curve, other: Curve) -> list[float]:
         apart = other.origin - curve.origin
         return [float((apart[0] * other.u[1] - apart[1] * other.u[0]) / cross)]
     if curve.v is None:
-        assert_v = np.column_stack([other.u, other.v])  # type: ignore[list-item]
-        a = np.linalg.solve(assert_v, curve.origin - other.origin)
-        b = np.linalg.solve(assert_v, curve.u)
+        frame = np.array([other.u, other.v]).T
+        a = np.linalg.solve(frame, curve.origin - other.origin)
+        b = np.linalg.solve(frame, curve.u)
         square, half, rest = float(b @ b), float(a @ b), float(a @ a) - 1.0
         below = half**2 - square * rest
         if below < 0.0:
@@ -192,7 +195,7 @@ def _meeting(curve: Curve, other: Curve, a: float, b: float) -> float:
 Point = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Polygon:
     """A shape with straight sides, or sides that are arcs of circles.
 
@@ -219,16 +222,27 @@ class Polygon:
         """Whether points, shape (2, n), lie inside: an odd number of the polygon's sides is then to their right."""
         x, y = points
         inside = np.zeros(x.shape, dtype=bool)
-        corners = np.array(self.corners_mm)
-        for (xa, ya), (xb, yb) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-            if ya != yb:
-                inside ^= ((ya > y) != (yb > y)) & (x < xa + (xb - xa) * (y - ya) / (yb - ya))
-        for arc in self.curves() if self.bulges else ():
-            if not arc.is_straight:  # the segment of the circle between the arc and its chord
-                (xa, ya), (xb, yb) = arc.start_mm, arc.end_mm
-                beside = (xb - xa) * (y - ya) - (yb - ya) * (x - xa)
-                inside ^= (arc.level(points) < 0.0) & (beside * (arc.t1 - arc.t0) < 0.0)
+        at_once = max(1, _AT_ONCE // max(1, x.size))
+        for first in range(0, self._sides.shape[1], at_once):
+            xa, ya, xb, yb = self._sides[:, first : first + at_once, None]
+            crossed = ((ya > y) != (yb > y)) & (x < xa + (xb - xa) * (y - ya) / (yb - ya))
+            inside ^= np.logical_xor.reduce(crossed, axis=0)
+        for arc in self._arcs:  # the segment of the circle between the arc and its chord
+            (xa, ya), (xb, yb) = arc.start_mm, arc.end_mm
+            beside = (xb - xa) * (y - ya) - (yb - ya) * (x - xa)
+            inside ^= (arc.level(points) < 0.0) & (beside * (arc.t1 - arc.t0) < 0.0)
         return inside
+
+    @cached_property
+    def _sides(self) -> Array:
+        """Ends xa, ya, xb, yb of the sides that are not level, with arcs replaced by chords; shape (4, n)."""
+        corners = np.array(self.corners_mm)
+        sides = np.hstack([corners, np.roll(corners, -1, axis=0)]).T
+        return sides[:, sides[1] != sides[3]]
+
+    @cached_property
+    def _arcs(self) -> tuple[Curve, ...]:
+        return tuple(curve for curve in self.curves() if not curve.is_straight) if any(self.bulges) else ()
 
 
 def _arc(a: Array, b: Array, bulge: float) -> Curve:
@@ -272,7 +286,7 @@ def in_arcs(at: Callable[[Array], Array], t0: float, t1: float, within_mm: float
     return in_arcs(at, t0, half, within_mm) + in_arcs(at, half, t1, within_mm)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Ellipse:
     """A disc or an ellipse.
 
@@ -303,7 +317,11 @@ class Ellipse:
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
         """Whether points, shape (2, n), lie inside."""
-        return np.asarray(self.curves()[0].level(points) < 0.0)
+        return np.asarray(self._whole.level(points) < 0.0)
+
+    @cached_property
+    def _whole(self) -> Curve:
+        return Curve(np.array(self.centre_mm), *self._axes(), 0.0, 2.0 * np.pi)
 
 
 Shape = Polygon | Ellipse
