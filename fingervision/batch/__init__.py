@@ -13,7 +13,7 @@ __all__ = ["diagnose", "measure"]
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=import_module(__name__))
-    return getattr(import_module("fingervision.cli._batch_list"), name)
+    return getattr(import_module("fingervision.cli._batch_calls"), name)
 
 
 def __dir__() -> list[str]:

@@ -200,6 +200,7 @@ def command(
     if source is None and bed_name is None:
         raise UsageError("The source must be given, but is not: name a camera, stream or file, or use `simulated`.")
     from fingervision.frames.source import CameraWish, Wish
+    from fingervision.frames.source_kinds import kind_of
     from fingervision.live.access import access
     from fingervision.live.beside import Beside
     from fingervision.live.opening import opened
@@ -230,6 +231,7 @@ def command(
         look_through(seen, out or LIVE_FOLDER, showing, beside, gauges, (second, rate_hz, choices) if second else None)
         return
     if second is not None:
+        kind_of(source)  # what is no source at all is told as that
         raise UsageError("--beside is for a recording, but the source is live: record it, and open the recording.")
     camera = CameraWish(pixel_format, exposure_ms, gain, focus, white_balance_k)
     capture = opened(source, Wish(rate_hz, None if size is None else _size(size), camera))

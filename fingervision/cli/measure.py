@@ -212,7 +212,8 @@ def _located(
 ) -> tuple["FollowedBodies", "Task"]:
     """Follow the bodies of the drawing, and state where its fingers and pairs are seen."""
     from fingervision.frames.frame_range import frame_range
-    from fingervision.frames.source import Wish, open_source
+    from fingervision.frames.source import Wish
+    from fingervision.frames.source_kinds import open_source
     from fingervision.measuring.body_poses import BodyTracker, FollowedBodies
     from fingervision.measuring.drawn_fingers import located
     from fingervision.measuring.frame_loop import coded, prepared

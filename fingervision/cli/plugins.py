@@ -54,7 +54,7 @@ def command(every: bool, as_json: bool) -> None:
 def _registries() -> list[Any]:
     from fingervision.diagnosis.report import report_parts
     from fingervision.effects import REGISTRY as EFFECTS
-    from fingervision.frames.source import REGISTRY as SOURCES
+    from fingervision.frames.source_kinds import REGISTRY as SOURCES
     from fingervision.models.kinds import REGISTRY as MODELS
     from fingervision.testbed.device_kinds import REGISTRIES
 

@@ -14,7 +14,8 @@ from fingervision.domain.frame import Coding
 from fingervision.frames.array_levels import what_it_is
 from fingervision.frames.arrays import ArrayFrames, KeptFrames, PictureStream
 from fingervision.frames.checked_frames import CheckedFrames
-from fingervision.frames.source import FrameSource, Wish, open_source
+from fingervision.frames.source import FrameSource, Wish
+from fingervision.frames.source_kinds import open_source
 from fingervision.interface.argument_checks import number, one_of, whole_number
 
 MUST = (

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from calib.calibration import BareScale
 from fingervision.domain.errors import ArgumentError
-from fingervision.frames.source import FrameSource, Wish, open_source
+from fingervision.frames.source import FrameSource, Wish
+from fingervision.frames.source_kinds import open_source
 from fingervision.inspection.catalogue import inspect as findings_of
 from fingervision.inspection.catalogue import to_mend
 from fingervision.inspection.finding import Finding

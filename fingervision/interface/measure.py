@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calib.calibration import BareScale
-from fingervision.frames.source import FrameSource, Wish, open_source
+from fingervision.frames.source import FrameSource, Wish
+from fingervision.frames.source_kinds import open_source
 from fingervision.interface.argument_checks import region_of, speaks_python
 from fingervision.interface.frame_sources import recording_of
 from fingervision.interface.measurement import Measurement

@@ -20,7 +20,7 @@ from fingervision.domain.errors import (
 from fingervision.domain.frame import Frame, Pixels
 from fingervision.frames.array_levels import levels_of, stated_shape, what_it_is
 from fingervision.frames.image_file import UnreadableImageError, is_image, read_image
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.interface.argument_checks import number, one_of
 from fingervision.vision.grey import GreyImage, to_grey
 

@@ -10,7 +10,8 @@ import av
 from fingervision.domain.errors import UsageError
 from fingervision.frames import camera
 from fingervision.frames.network_stream import without_password
-from fingervision.frames.source import CameraWish, Description, FrameSource, LiveSource, Received, Wish, open_source
+from fingervision.frames.source import CameraWish, Description, FrameSource, LiveSource, Received, Wish
+from fingervision.frames.source_kinds import open_source
 from fingervision.live.capture import Capture
 
 # Playback of a recording in real time, as if the frames came from a camera.

@@ -6,7 +6,8 @@ import numpy as np
 
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.checked_frames import description_faults, held
-from fingervision.frames.source import FrameSource, SourceKind, Wish
+from fingervision.frames.source import FrameSource, Wish
+from fingervision.frames.source_kinds import SourceKind
 from fingervision.testing.contract import ContractError, NotApplicable, hold
 
 LOOKED_AT = 8

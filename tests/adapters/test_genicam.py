@@ -14,7 +14,8 @@ import fingervision as fv
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
 from fingervision.frames import genicam as adapter
-from fingervision.frames.source import CameraWish, Wish, open_source
+from fingervision.frames.source import CameraWish, Wish
+from fingervision.frames.source_kinds import open_source
 
 PRODUCER = Path(genicam.__file__).parent / "viky.cti"
 NAME = f"genicam:{PRODUCER}"

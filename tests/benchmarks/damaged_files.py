@@ -24,7 +24,7 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.domain.status import Status
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.measuring.in_memory import measure_in_memory
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers

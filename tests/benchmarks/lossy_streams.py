@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.calibration import BareScale
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers

@@ -29,7 +29,7 @@ from calib.calibration import BareScale
 from fingervision.domain.direction import Direction
 from fingervision.domain.frame import Coding, Frame, Pixels
 from fingervision.domain.gap import NoGap
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers

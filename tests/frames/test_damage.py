@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.damage import EvenRow, believable
 from fingervision.frames.file_pictures import AviPlaces
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from tests import clips
 
 RATE_HZ, COUNT, SIZE_PX = 25, 60, (96, 64)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fingervision.frames.source import REGISTRY
+from fingervision.frames.source_kinds import REGISTRY
 from fingervision.testing import FrameSourceContract, NotApplicable, checks_of
 from fingervision.testing.frame_source_contract import NOWHERE
 

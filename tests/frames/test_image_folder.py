@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.domain.status import Status
-from fingervision.frames.source import FrameSource, Wish, open_source
+from fingervision.frames.source import FrameSource, Wish
+from fingervision.frames.source_kinds import open_source
 
 
 def noise(seed: int, shape: tuple[int, ...] = (30, 40), bits: int = 8) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fingervision.domain.frame import Frame
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.frames.unchecked_codecs import CLUSTER
 from tests.clips import Codec, coded
 from tests.frames.test_damage import COUNT, RATE_HZ, film, nothing_wrong, packets, read

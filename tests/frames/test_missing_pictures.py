@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
 from fingervision.frames.decoded_picture import luma
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from tests import clips
 
 RATE_HZ, COUNT, SIZE_PX = 25, 90, (96, 64)

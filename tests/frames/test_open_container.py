@@ -6,7 +6,7 @@ import av
 import pytest
 
 from fingervision.frames.open_container import open_container
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from tests.clips import h264, write_clip
 from tests.frames.test_video_file import smooth_pictures, timed
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fingervision.domain.frame import Frame
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 
 SIZE_PX, FRAMES, MOVED = (160, 120), 6, 3
 CLUSTER = bytes.fromhex("1F43B675")

@@ -15,7 +15,7 @@ from fingervision.domain.quantiser import BLOCK_PX, Quantiser
 from fingervision.frames import decoded_picture
 from fingervision.frames.decoded_picture import FADES, H264, VP9, VP9_STEPS, StatedSteps, StepTrail
 from fingervision.frames.seeking import seeking
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from tests.frames.test_rotation import turn
 
 HEIGHT, WIDTH = 72, 104  # neither is a multiple of 16

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fingervision.domain.frame import Frame
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 
 FFMPEG = shutil.which("ffmpeg")
 HEIGHT, WIDTH = 48, 64

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from fingervision.domain.errors import DataError, InputFileError, UsageError
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.status import Status
-from fingervision.frames.source import Wish, open_source
+from fingervision.frames.source import Wish
+from fingervision.frames.source_kinds import open_source
 from tests.clips import FFV1, Codec, h264, mjpeg, write_clip
 
 # Matroska rounds a time to its tick of 1 ms; MP4 keeps the 90 kHz clock's tick.

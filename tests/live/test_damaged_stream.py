@@ -11,7 +11,7 @@ from calib.calibration import BareScale
 from fingervision.domain.errors import DeviceError
 from fingervision.domain.frame import Frame, LostFrame
 from fingervision.frames.network_stream import NetworkStream
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.live.capture import Arrival, Capture, Ended
 from fingervision.live.run_folder import RecordedFrame, RunFolder
 from fingervision.live.supervisor import Supervisor

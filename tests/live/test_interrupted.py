@@ -19,7 +19,8 @@ from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Coding, Frame
 from fingervision.frames import camera
 from fingervision.frames.camera_settings import V4L2
-from fingervision.frames.source import Description, Received, Wish, open_source
+from fingervision.frames.source import Description, Received, Wish
+from fingervision.frames.source_kinds import open_source
 from fingervision.live import capture as capture_module
 from fingervision.live.capture import Capture
 from fingervision.live.choices import Choices

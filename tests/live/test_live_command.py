@@ -26,6 +26,8 @@ def refused(*arguments: str | Path) -> FingervisionError:
     [
         ((), "The source must be given, but is not"),
         (("nothing.mp4",), "There is no recording nothing.mp4"),
+        (("nothing.mp4", "--beside", __file__), "There is no recording nothing.mp4"),
+        (("simulated", "--beside", __file__), "--beside is for a recording, but the source is live"),
         (
             ("http://127.0.0.1:9/feed", "--px-per-mm", "34"),
             "The stream http://127.0.0.1:9/feed must answer",

@@ -22,7 +22,8 @@ from fingervision.frames import image_file, image_folder
 from fingervision.frames.frame_range import frame_range
 from fingervision.frames.image_folder import ImageFolder
 from fingervision.frames.seeking import UNNUMBERED, frame_times_s
-from fingervision.frames.source import FrameSource, open_source
+from fingervision.frames.source import FrameSource
+from fingervision.frames.source_kinds import open_source
 from fingervision.live.choices import Choices
 from fingervision.live.commands import obey
 from fingervision.live.comparison.comparison import Comparison

@@ -14,7 +14,8 @@ from fingervision.domain.camera import Origin
 from fingervision.domain.frame import Coding, Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.frames.ahead import FRAMES_AHEAD
-from fingervision.frames.source import Description, open_source
+from fingervision.frames.source import Description
+from fingervision.frames.source_kinds import open_source
 from fingervision.live import frame_measurement
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import FrameMeasurement

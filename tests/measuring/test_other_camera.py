@@ -8,7 +8,7 @@ import pytest
 
 from calib.measured_scale import Calibration
 from fingervision.domain.frame import Frame
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.measuring.measure import measure
 from fingervision.measuring.task import Task
 from fingervision.rendering import Camera, render, two_fingers

@@ -8,7 +8,7 @@ import pytest
 
 from fingervision.domain.frame import Coding, Frame, LostFrame
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.measuring.sound_picture import SoundPictures, foreign_corners
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame

@@ -7,14 +7,14 @@ import pytest
 
 from fingervision.diagnosis.report import report_parts
 from fingervision.effects import REGISTRY
-from fingervision.frames import source
+from fingervision.frames import source_kinds
 from fingervision.models import kinds
 from fingervision.testbed.device_kinds import REGISTRIES
 
 
 @pytest.fixture(autouse=True)
 def _anew() -> Iterator[None]:
-    registries = (REGISTRY, kinds.REGISTRY, source.REGISTRY, report_parts.REGISTRY, *REGISTRIES.values())
+    registries = (REGISTRY, kinds.REGISTRY, source_kinds.REGISTRY, report_parts.REGISTRY, *REGISTRIES.values())
     before = set(sys.modules)
     for registry in registries:
         registry.forget()  # type: ignore[attr-defined]

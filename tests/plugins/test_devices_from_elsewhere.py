@@ -9,7 +9,8 @@ from click.testing import CliRunner, Result
 
 from fingervision.cli import cli
 from fingervision.domain.errors import FingervisionError, UsageError
-from fingervision.frames.source import Wish, open_source
+from fingervision.frames.source import Wish
+from fingervision.frames.source_kinds import open_source
 from fingervision.models.kinds import build_model, kinds
 from fingervision.plugins.faults import PluginShapeError
 from fingervision.testbed.bed_factory import open_bed

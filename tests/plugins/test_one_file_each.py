@@ -28,7 +28,7 @@ FILES = {
 PROGRAM = """
 import json
 from fingervision.effects import catalogue, origin_of
-from fingervision.frames.source import REGISTRY as SOURCES
+from fingervision.frames.source_kinds import REGISTRY as SOURCES
 from fingervision.models.kinds import REGISTRY as MODELS
 from fingervision.testing import (
     ActuatorContract, CameraContract, EffectContract, FrameSourceContract, ModelContract, bed_at, diagnosed, run

@@ -7,7 +7,7 @@ import pytest
 
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.rendering import Camera, render, two_fingers
 from fingervision.vision.pipeline import Settings, measure_frame
 from tests import clips

@@ -12,7 +12,7 @@ import numpy as np
 
 from fingervision.domain.errors import FingervisionError
 from fingervision.domain.frame import Frame
-from fingervision.frames.source import open_source
+from fingervision.frames.source_kinds import open_source
 from fingervision.motion.encoder_path import reversals
 from fingervision.storage.plain_file import json_of
 from fingervision.storage.summary_json import SUMMARY

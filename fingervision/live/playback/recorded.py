@@ -11,7 +11,8 @@ from fingervision.domain.direction import Direction
 from fingervision.domain.errors import DataError, FingervisionError
 from fingervision.domain.frame import Frame, LostFrame, Region
 from fingervision.domain.gap import GapMeasurement, NoGap
-from fingervision.frames.source import Description, FrameSource, Wish, open_source
+from fingervision.frames.source import Description, FrameSource, Wish
+from fingervision.frames.source_kinds import open_source
 from fingervision.live.choices import Choices
 from fingervision.live.frame_measurement import FrameMeasurement, Seen
 from fingervision.storage.beside import optional_document

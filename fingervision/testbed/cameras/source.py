@@ -6,7 +6,8 @@ from threading import Condition, Thread
 from typing import cast
 
 from fingervision.domain.errors import DeviceError, FingervisionError
-from fingervision.frames.source import LiveSource, Received, Wish, open_source
+from fingervision.frames.source import LiveSource, Received, Wish
+from fingervision.frames.source_kinds import open_source
 from fingervision.storage.toml_section import Section
 from fingervision.testbed.build_context import BuildContext
 from fingervision.testbed.camera import Latency, Taken

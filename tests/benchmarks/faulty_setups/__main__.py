@@ -16,7 +16,8 @@ import cv2
 import numpy as np
 
 from calib.calibration import BareScale
-from fingervision.frames.source import Wish, open_source
+from fingervision.frames.source import Wish
+from fingervision.frames.source_kinds import open_source
 from fingervision.inspection.catalogue import inspect, to_mend
 from fingervision.inspection.sample import take_sample
 from fingervision.measuring.task import Task
