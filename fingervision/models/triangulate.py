@@ -8,6 +8,7 @@ the plane). Midside nodes lie on the arcs of the outline.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import dist
 
@@ -18,7 +19,7 @@ from scipy.spatial import Delaunay, cKDTree
 from fingervision.domain.errors import ModelError
 from fingervision.models.mesh_size import SizeField, size_field
 from fingervision.models.planar_region import PlanarRegion
-from fingervision.models.plane_shapes import Curve
+from fingervision.models.plane_shapes import Curve, Outlined, Point
 
 # A mesh of quadratic triangles in the plane, and the quality of its triangles.
 
@@ -174,8 +175,11 @@ def with_middles(points: Array, triangles: Indices, sides: list[OutlineSide]) ->
         if not side.curve.is_straight:
             a, b = sorted((int(place_of[side.first]), int(place_of[side.second])))
             middles[:, place_of_edge[a, b]] = side.curve.at(np.array([0.5 * (side.t0 + side.t1)]))[:, 0]
-    nodes = np.concatenate([corners, middles], axis=1)
-    return PlaneMesh(nodes, np.vstack([triangles, used.size + place.reshape(3, -1)]))
+    mesh = PlaneMesh(
+        np.concatenate([corners, middles], axis=1), np.vstack([triangles, used.size + place.reshape(3, -1)])
+    )
+    mesh.nodes_mm.flags.writeable = mesh.triangles.flags.writeable = False  # several models may hold it
+    return mesh
 
 
 _MENDING = 12
@@ -313,6 +317,8 @@ __all__ = ["LEAST_QUALITY", "PlaneMesh", "triangulate"]
 
 _REFINED = 4
 """Rounds of dividing the outline at flat triangles; at sharp corners of the outline triangles must stay flat."""
+_MOST_KEPT = 8
+"""Meshes that are kept: several kinds of model, and a corrected model beside its base, have the body of one drawing."""
 
 
 def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMesh:
@@ -332,6 +338,14 @@ def triangulate(region: PlanarRegion, across: float, body_mm: float) -> PlaneMes
     ModelError
         If the body's finest part is so small compared with its size that too many triangles would be needed.
     """
+    return _meshed(region.steps, region.marks_mm, across, body_mm)
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def _meshed(
+    steps: tuple[tuple[bool, Outlined], ...], marks_mm: tuple[Point, ...], across: float, body_mm: float
+) -> PlaneMesh:
+    region = PlanarRegion(steps, marks_mm)
     field = size_field(region, across, body_mm)
     sides = divided_outline(region, field)
     refined = 0

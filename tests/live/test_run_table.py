@@ -3,6 +3,7 @@
 import weakref
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from time import monotonic, sleep
 
@@ -41,6 +42,7 @@ def coded_as_srgb(levels: np.ndarray) -> np.ndarray:
     return np.round(255.0 * coded).astype(np.uint8)
 
 
+@cache
 def frame_of(k: int) -> Frame:
     scene = two_fingers(50.0 + 0.5 * k, below_tip_px=5.1, width_px=25.0, frame=SIZE_PX)
     levels = coded_as_srgb(render(scene, Camera(noise_grey=1.0), np.random.default_rng(k)))
@@ -112,7 +114,7 @@ def test_pictures_do_not_wait_in_memory_while_the_camera_is_learnt(
     run = RunFolder(tmp_path / "runs", DESCRIPTION, task, None)
     for k in range(2 * COUNT):
         frame = frame_of(k % COUNT)
-        frame = replace(frame, index=k, time_s=k / 25.0)
+        frame = replace(frame, pixels=frame.pixels.copy(), index=k, time_s=k / 25.0)
         pictures.append(weakref.ref(frame.pixels))
         run.add(RecordedFrame(frame, ()))
         del frame
