@@ -229,6 +229,8 @@ class Effect:
     start : str
         Description of the unknown state of an effect with memory at the start of a run; empty if the state is known.
         The start state is a nuisance parameter of the run: a number from -1 to 1 under the key `start_key(run)`.
+    starts_at_ends : bool
+        Whether every long motion leaves the state at -1 or 1, as it takes up a play, so that most runs begin there.
     curve : bool
         Whether the effect is a curve that is estimated as a whole; the parameters then only describe this curve.
     narrow : callable or None
@@ -289,6 +291,7 @@ class Effect:
     needs_bodies: bool = False
     memory: bool = False
     start: str = ""
+    starts_at_ends: bool = False
     curve: bool = False
     narrow: Callable[[History], "tuple[Parameter, ...] | str"] | None = None
     inexact: Callable[[Values], tuple[Values, ...]] | None = None
@@ -324,7 +327,7 @@ class Effect:
         found = self.parameters if self.narrow is None else self.narrow(history)
         if isinstance(found, str) or not self.start:
             return found
-        return (*found, *(_start(self.start, run) for run in range(len(history.runs))))
+        return (*found, *(_start(self, run) for run in range(len(history.runs))))
 
     def within(self, values: Values) -> dict[str, float]:
         """Return parameter values whose sum is at most `most_together`: larger ones are scaled by one factor."""
@@ -356,8 +359,9 @@ def start_key(run: int) -> str:
     return f"start_{run + 1}"
 
 
-def _start(words: str, run: int) -> Parameter:
-    return Parameter(start_key(run), "", -1.0, 1.0, f"{words}, in run {run + 1}", run=run)
+def _start(effect: Effect, run: int) -> Parameter:
+    words = f"{effect.start}, in run {run + 1}"
+    return Parameter(start_key(run), "", -1.0, 1.0, words, run=run, at_ends=effect.starts_at_ends)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

@@ -38,6 +38,10 @@ class Parameter:
     run : int or None
         Index of the run whose start state this is, a nuisance parameter that is fitted together with the effect and is
         not reported. None for a parameter of the effect itself.
+    place : bool
+        Whether this is a place between the bounds, a priori as probable at one place as at another.
+    at_ends : bool
+        Whether the bounds are the usual values of a start state, each with a probability of its own.
     """
 
     name: str
@@ -52,6 +56,8 @@ class Parameter:
     rugged: bool = False
     typical: float | None = None
     run: int | None = None
+    place: bool = False
+    at_ends: bool = False
 
     def starting_values(self) -> NDArray[np.float64]:
         """Values inside the bounds from which a search starts.

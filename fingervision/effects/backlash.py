@@ -27,6 +27,7 @@ EFFECT = DriveEffect(
     needs_times=True,
     memory=True,
     start="position within the play, in half widths of the play",
+    starts_at_ends=True,
     demonstrated=True,
     act=act,
 )

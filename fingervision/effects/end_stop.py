@@ -33,8 +33,8 @@ EFFECT = DriveEffect(
     source="definition",
     residual="zero up to the stop; beyond the stop, the missing input times the slope of the model",
     parameters=(
-        Parameter("upper_mm", "mm", -1e3, 1e3, "input at the upper stop", neutral=1e3, starts=10),
-        Parameter("lower_mm", "mm", -1e3, 1e3, "input at the lower stop", neutral=-1e3, starts=10),
+        Parameter("upper_mm", "mm", -1e3, 1e3, "input at the upper stop", neutral=1e3, starts=10, place=True),
+        Parameter("lower_mm", "mm", -1e3, 1e3, "input at the lower stop", neutral=-1e3, starts=10, place=True),
     ),
     narrow=narrow,
     checks={FurtherCheck.FORCE: False},

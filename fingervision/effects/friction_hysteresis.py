@@ -49,6 +49,7 @@ EFFECT = DriveEffect(
     needs_times=True,
     memory=True,
     start="deflection of the friction sliders, as a fraction of their reach",
+    starts_at_ends=True,
     narrow=narrow,
     demonstrated=True,
     act=act,

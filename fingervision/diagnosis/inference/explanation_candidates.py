@@ -39,9 +39,9 @@ SWAPS_REFITTED = 24
 def best_each(explanations: Iterable[Explanation]) -> list[Explanation]:
     """Keep the best fit of every set of effects; best first."""
     found: dict[tuple[str, ...], Explanation] = {}
-    for explanation in sorted(explanations, key=lambda one: one.score):
+    for explanation in sorted(explanations, key=lambda one: one.bic):
         found.setdefault(explanation.names, explanation)
-    return list(found.values())
+    return sorted(found.values(), key=lambda one: one.score)
 
 
 def single_effects(
@@ -62,7 +62,7 @@ def single_effects(
             between = [{listed[0].name: value} for value in _finely(problem, listed[0]).tolist()]
             starts.append(scan(problem, nothing, name, between)[0])
         tries = [fit(problem, (name,), {name: start}, iterations=SCREENED) for start in starts]
-        best = min(tries, key=lambda explanation: explanation.score)
+        best = likeliest(tries)
         found.append(fit(problem, (name,), best.values, iterations=iterations))
     return sorted(found, key=lambda explanation: explanation.score)
 

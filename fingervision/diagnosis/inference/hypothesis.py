@@ -12,8 +12,6 @@ from fingervision.domain.effect import Array, Effect
 from fingervision.domain.parameter import Parameter
 
 Point = dict[str, dict[str, float]]
-START_VARIANCE = 1.0 / 3.0
-"""Variance of a start state that is uniformly distributed between -1 and 1."""
 FORM_SHARE = 0.02
 """Typical inexactness of an effect's formula, as a share of the change that the effect causes."""
 SMALL_SHARE = 0.05
@@ -43,6 +41,9 @@ class Explanation:
         Spread of the run offsets under this explanation, for each channel.
     starts_price : float
         Penalty of the fitted start states: twice the logarithm of prior width over posterior width, summed.
+    places_price : float
+        Penalty of the places found, beyond that of a parameter: twice the logarithm of prior width over posterior
+        width, summed.
     rows : int
         Number of measured values that were not set aside.
     """
@@ -55,12 +56,13 @@ class Explanation:
     free: int
     sigma_mm: tuple[float, ...]
     starts_price: float = 0.0
+    places_price: float = 0.0
     rows: int = 2
 
     @property
     def bic(self) -> float:
-        """Bayesian information criterion (Schwarz 1978): score plus penalties for free parameters and start states."""
-        return self.score + self.free * float(np.log(self.rows)) + self.starts_price
+        """Bayesian information criterion (Schwarz 1978), with penalties by their priors for places and start states."""
+        return self.score + self.free * float(np.log(self.rows)) + self.starts_price + self.places_price
 
 
 @dataclass(frozen=True, slots=True, eq=False)

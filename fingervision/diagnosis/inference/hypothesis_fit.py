@@ -1,13 +1,14 @@
 """Fit a hypothesis: the effects are placed in the measuring chain and fitted jointly by generalised least squares."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.inference.hypothesis import START_VARIANCE, Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
+from fingervision.diagnosis.inference.parameter_priors import inner_price, places_price, starts_price
 from fingervision.domain.effect import Array
 from fingervision.domain.parameter import Parameter
 
@@ -76,7 +77,14 @@ class Descent(Generic[Weighted]):
         return out
 
 
-def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterations: int) -> Descent[Weighted]:
+def descend(
+    squares: Weighted,
+    start: Array,
+    lower: Array,
+    upper: Array,
+    iterations: int,
+    leaving: Callable[[Array], Array] = np.zeros_like,
+) -> Descent[Weighted]:
     """Minimise a sum of squares within bounds.
 
     Parameters
@@ -87,6 +95,9 @@ def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterati
         Starting point and bounds.
     iterations : int
         Largest number of iterations.
+    leaving : callable
+        Returns, for the diagonal of the normal matrix, by how much each parameter must reduce the sum of squares to
+        leave a bound.
     """
     x, damping = start, 1e-3
     residual = squares.residual(x)
@@ -95,7 +106,7 @@ def descend(squares: Weighted, start: Array, lower: Array, upper: Array, iterati
     normal, free = np.zeros((x.size, x.size)), np.ones(x.size, dtype=bool)
     for step_number in range(iterations):
         normal, pull = squares.linearised(x, residual)
-        free = _free(x, pull, normal, lower, upper)
+        free = _free(x, pull, np.diag(normal), (lower, upper), leaving(np.diag(normal)))
         if not free.any():
             break
         part, scale = _in_own_units(normal, free)
@@ -158,11 +169,14 @@ def bounded_step(matrix: Array, pull: Array, bounds: tuple[Array, Array]) -> Arr
     return step
 
 
-def _free(x: Array, pull: Array, normal: Array, lower: Array, upper: Array) -> NDArray[np.bool_]:
-    """Mask of the free parameters: those that no bound blocks and that the data determine."""
+def _free(x: Array, pull: Array, curvature: Array, bounds: tuple[Array, Array], least: Array) -> NDArray[np.bool_]:
+    """Mask of the free parameters: those that no bound holds and that the data determine."""
+    lower, upper = bounds
     near = AT_BOUND * (upper - lower)
-    held = ((x <= lower + near) & (pull <= 0.0)) | ((x >= upper - near) & (pull >= 0.0))
-    return np.asarray(~held & (np.diag(normal) > 1e-12), dtype=bool)
+    # Away from the bound, the sum of squares falls by pull^2 / curvature.
+    leaves = pull * np.abs(pull) / np.maximum(curvature, 1e-300)
+    held = ((x <= lower + near) & (leaves <= least)) | ((x >= upper - near) & (leaves >= -least))
+    return np.asarray(~held & (curvature > 1e-12), dtype=bool)
 
 
 def _in_own_units(normal: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -306,27 +320,30 @@ def fit(
     listed = problem.parameters(order)
     lower, upper = _bounds(listed)
     squares = _JointSquares(problem, aim, order, listed, np.zeros((0, 0)), sigma_mm)
-    found = descend(squares, np.clip(squares.point(start), lower, upper), lower, upper, iterations)
+    at_ends = np.array([parameter.at_ends for _, parameter in listed])
+
+    def leaving(curvature: Array) -> Array:
+        # What one explanation can imitate of another one does not depend on the prior of its start states.
+        return np.where(at_ends & (target is None), inner_price(curvature, problem.rows), 0.0)
+
+    found = descend(squares, np.clip(squares.point(start), lower, upper), lower, upper, iterations, leaving)
     found = _scanned(found, lower, upper, thorough=iterations >= MANY_STEPS)
     spread, penalty, cost = sigma_mm, 0.0, found.cost
     if spread is None:
         spread, penalty = problem.offsets.spread(found.residual)
         cost = problem.offsets.squared(found.residual, problem.offsets.metric(spread))
     own = np.array([parameter.run is None for _, parameter in listed], dtype=bool)
-    # The prior of a start state is uniform between -1 and 1, with a variance of 1/3; this also holds for a start state
-    # at a bound. The penalty is at most that of a free parameter; otherwise a play would be less probable than two
-    # effects that imitate it.
-    # Rounding may leave a curvature that is zero slightly below zero.
-    prices = np.log1p(np.maximum(np.diag(found.normal)[~own], 0.0) * START_VARIANCE)
+    covariance = found.covariance()
     return Explanation(
         names=order,
         values=squares.settings(found.x),
         score=cost + penalty,
         residual=found.residual,
-        covariance=found.covariance(),
+        covariance=covariance,
         free=int((found.free & own).sum()),
         sigma_mm=spread,
-        starts_price=float(np.sum(np.minimum(prices, np.log(problem.rows)))),
+        starts_price=starts_price(listed, found.x, np.diag(found.normal), problem.rows),
+        places_price=places_price(listed, covariance, problem.rows),
         rows=problem.rows,
     )
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fingervision.diagnosis.inference.evidence import noise_doubt, odds
-from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, START_VARIANCE, Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis import FORM_SHARE, Explanation, Point, Problem
+from fingervision.diagnosis.inference.parameter_priors import START_VARIANCE
 from fingervision.domain.effect import Array, Effect
 from fingervision.domain.parameter import Parameter
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fingervision.diagnosis.inference.hypothesis import START_VARIANCE, Explanation, Point, Problem
+from fingervision.diagnosis.inference.hypothesis import Explanation, Point, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import derivatives, refit
 from fingervision.diagnosis.inference.measuring_chain import MeasuringChain
+from fingervision.diagnosis.inference.parameter_priors import START_VARIANCE
 from fingervision.diagnosis.inference.posterior import settled
 from fingervision.diagnosis.input.observations import Observations
 from fingervision.diagnosis.noise.channel_noises import (
