@@ -144,21 +144,15 @@ class RunGains(RandomEffect):
     sd: float
 
     @property
-    def scatter_mm(self) -> Array:
-        """Change of the prediction by the gains' deviations from their mean."""
-        return np.asarray(self.columns_mm @ (self.coefficients - self.coefficients.mean()), dtype=np.float64)
-
-    def without_mean(self) -> "RunGains":
-        """Remove the gains' common mean, which is an effect of the catalogue."""
-        shared = np.full((self.coefficients.size,) * 2, 1.0 / self.coefficients.size)
-        return replace(self, columns_mm=self.columns_mm - self.columns_mm @ shared)
+    def each(self) -> str:
+        """Estimated gains of the runs, in words."""
+        return ", ".join(f"{100.0 * self.sd * number:+.2g}" for number in self.coefficients) + " %"
 
     @property
     def words(self) -> str:
         """Sentence with the estimated scatter of the runs' gains."""
-        each = ", ".join(f"{100.0 * self.sd * number:+.2g}" for number in self.coefficients - self.coefficients.mean())
         return (
-            f"the gain differs from run to run (by {each} %): this counts as scatter between the runs, like their "
+            f"the gain differs from run to run (by {self.each}): this counts as scatter between the runs, like their "
             "offsets, and not as an effect."
         )
 

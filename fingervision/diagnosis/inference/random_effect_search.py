@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fingervision.diagnosis.inference.evidence import PATHS, TWICE, rms
+from fingervision.diagnosis.inference.evidence import PATHS, STRONG, TWICE, rms
 from fingervision.diagnosis.inference.explanation_candidates import different
 from fingervision.diagnosis.inference.hypothesis import Explanation, Problem
 from fingervision.diagnosis.inference.hypothesis_fit import fit, refit
@@ -37,43 +37,50 @@ def beside_gains(state: Searched, look: Look) -> Searched:
 
     If a named effect changes the prediction more than the gains of the runs do, the gains are nuisance parameters. If
     the gains of the runs change the prediction more than every named effect, the gains are reported as structure
-    without a name. If further effects are not much more probable than gains that differ between runs, the gains are
-    kept, because naming an effect claims more than stating a scatter.
+    without a name. If effects are not 20 times as probable as gains that differ between runs, the gains are kept,
+    because naming an effect claims more than stating a scatter. The gains have no common mean: a mean within their
+    scatter is no ratio, and the interval of a ratio beside them contains it.
     """
     found = state.found
     if len(state.data.chain.history.runs) < FEWEST_RUNS:
         return state
     explained = found.unknown is None and standing_of(state.data, found).is_little
+    if explained and not found.best.names:
+        return state
+    # Effects are named at odds of 20:1 against gains.
+    least = -STRONG if explained else LEAST_GAIN
+    others = () if explained else (_line(found.problem), *found.singles[:BESIDE])
+    likelier = _likelier(found, likeliest_gains, least, others)
+    if likelier is None:
+        return state
+    known, gains = likelier
     if explained:
-        likelier = _likelier(found, likeliest_gains, -LEAST_GAIN) if len(found.best.names) > 1 else None
-        known, gains = likelier or (None, None)
-        if known is None or gains is None:
-            return state
         seen = replace(state.data, run_gains=gains)
-        if not standing_of(seen, replace(found, best=known, problem=problem_of(seen, known))).is_little:
+        best = found.nothing if known is None else known
+        if not standing_of(seen, replace(found, best=best, problem=problem_of(seen, best))).is_little:
             return state
-    else:
-        tried = [likeliest_gains(found.problem, one) for one in (found.best, *found.singles[:BESIDE])]
-        gains, gain = max(tried, key=lambda one: one[1])
-        if gain < LEAST_GAIN:
-            return state
-        known = found.best if found.best.names else None
     beside = look.again(replace(state.data, run_gains=gains), known)
-    stands = standing_of(beside.data, beside.found)
-    if not stands.is_little:
-        # A common mean of the gains is an effect, and must not be part of their scatter.
-        apart = look.again(replace(state.data, run_gains=gains.without_mean()), known)
-        if standing_of(apart.data, apart.found).after_mm < stands.after_mm:
-            beside = apart
     left = standing_of(beside.data, beside.found)
     # If runs stay at one position, their gains are only offsets and can have any value. The remaining residuals are
     # therefore compared as well.
-    worse = not left.is_little and left.after_mm > standing_of(state.data, found).after_mm
-    if worse or not _does_more(beside):
+    if not left.is_little and left.after_mm > standing_of(state.data, found).after_mm:
         return state
     fewer = len(beside.found.best.names) < len(found.best.names)
-    least = -LEAST_GAIN if explained and fewer else LEAST_GAIN
-    return beside if _gained(state, beside, gains) > least else state
+    gained = _gained(state, beside, gains)
+    if _does_more(beside):
+        return beside if gained > (least if fewer else LEAST_GAIN) else state
+    return _unrepeatable(state, beside) if gained > -STRONG and (fewer or not explained) else state
+
+
+def _unrepeatable(state: Searched, beside: Searched) -> Searched:
+    """Name nothing if gains of the runs explain the table, and effects beside them hardly change the prediction."""
+    gains = beside.data.run_gains
+    if gains is None or not standing_of(beside.data, beside.found).is_little:
+        return state
+    each = gains.refitted(beside.found.problem, beside.found.best).each
+    words = f"gains that differ from run to run (by {each}) are as probable as any effect"
+    found = replace(state.found, best=state.found.problem.nothing(), alternatives=(), unknown=words)
+    return replace(state, found=found)
 
 
 def beside_map(state: Searched, look: Look) -> Searched:
@@ -177,7 +184,8 @@ def _likelier(
     singles = different(problem, list(found.singles), BESIDE)
     tried = []
     begins = (found.nothing, _line(problem), *singles, *([found.best] if least > 0.0 else []))
-    fewer = [e for e in begins if len(e.names) <= len(found.best.names)]
+    # What is not more probable must claim less.
+    fewer = [e for e in begins if len(e.names) + (least < 0.0) <= len(found.best.names)]
     for begin in {e.names: e for e in (*others, *fewer)}.values():
         known, (effect, _) = begin, estimated(problem, begin)
         for _ in range(ROUNDS):
@@ -217,7 +225,7 @@ def _does_more(beside: Searched) -> bool:
     best, gains = beside.found.best, beside.data.run_gains
     if gains is None or not best.names:
         return False
-    scatter_mm = gains.refitted(beside.found.problem, best).scatter_mm
+    scatter_mm = gains.refitted(beside.found.problem, best).fitted_mm
     changed_mm = beside.data.chain.stacked(best.values) - beside.data.chain.stacked({})
     return bool(np.linalg.norm(changed_mm) > np.linalg.norm(scatter_mm))
 

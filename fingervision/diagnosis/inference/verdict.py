@@ -128,7 +128,7 @@ class Standing:
 def standing(data: Observations, problem: Problem, before_mm: Array, after_mm: Array) -> Standing:
     """Compute the share of the disagreement that remains; `before_mm` and `after_mm` have shape (channels * n,)."""
     if data.run_gains is not None:
-        after_mm = after_mm - data.run_gains.scatter_mm
+        after_mm = after_mm - data.run_gains.fitted_mm
     history = data.chain.history
     n, both, runs = history.input_mm.size, history.both_edges, history.runs
     aside = isolated(after_mm[:n], problem.whitener.aside[:n], runs)
