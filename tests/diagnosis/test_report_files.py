@@ -180,6 +180,17 @@ def test_the_figure_for_a_paper_shows_apart_what_coincides(width_mm: float) -> N
     assert edges.x1 <= figure.bbox.x1
 
 
+def test_a_table_of_five_inputs_has_its_figure_without_a_warning() -> None:
+    # A warning is an error in tests: five inputs do not determine the six coefficients of a curve of the fifth degree.
+    input_mm = np.tile(np.concatenate([np.arange(5.0), np.arange(5.0)[::-1]]), 3)
+    opens = np.tile(np.repeat([True, False], 5), 3)
+    model = 4.0 + 7.7 * input_mm
+    curves = GapCurves(
+        input_mm, model - 0.05 * opens, np.full(30, 0.01), opens, None, (slice(0, 30),), {"model": model}
+    )
+    assert paper_figure(curves).axes[0].child_axes
+
+
 def test_curves_that_are_apart_need_no_inset() -> None:
     input_mm = np.linspace(0.0, 1.0, 50)
     model = 4.0 + 7.7 * input_mm

@@ -197,8 +197,9 @@ def _window(curves: GapCurves) -> tuple[float, float] | None:
     every = np.vstack([curves.gap_mm, *curves.predictions.values()])
     apart = np.ptp(every, axis=0)
     if curves.directed and curves.opens.any() and not curves.opens.all():
-        # The two directions of the measurement differ too, whatever the models predict.
-        line = np.polynomial.Polynomial.fit(x, curves.gap_mm, 5)
+        # The two directions of the measurement differ too, whatever the models predict. Few inputs determine a lower
+        # degree.
+        line = np.polynomial.Polynomial.fit(x, curves.gap_mm, min(5, np.unique(x).size - 1))
         apart = np.maximum(apart, 2.0 * np.abs(curves.gap_mm - line(x)))
     if np.percentile(apart, 95.0) > COINCIDE * whole:
         return None
