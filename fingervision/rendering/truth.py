@@ -1,6 +1,7 @@
 """The true gap between two fingers, from their outline before blurring."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import hypot
 
 import numpy as np
@@ -19,6 +20,8 @@ from fingervision.rendering.scene import Scene
 BRACKET_POINTS = 17
 # Points at most this far behind the outermost point belong to the tip.
 FLAT_PX = 1e-6
+# Fingers whose measuring point is kept: all frames of a film have the same two.
+_MOST_KEPT = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +176,7 @@ def _crossings(outline: Outline, axes: Motion, along_px: float) -> list[float]:
     return crossings
 
 
+@lru_cache(maxsize=_MOST_KEPT)
 def measuring_point(shape: Outline, below_tip_px: float, side: int) -> tuple[float, float]:
     """Inner edge and tip of one finger in its own axes: x across, y towards the root.
 
