@@ -13,7 +13,7 @@ from fingervision.domain.gap import NoGap
 from fingervision.domain.status import Status
 from fingervision.rendering.camera import Camera
 from fingervision.rendering.finger import AXES
-from fingervision.rendering.outline import SAME_POINT_PX, Motion, Outline, Piece
+from fingervision.rendering.outline import SAME_POINT_PX, Line, Motion, Outline, Piece
 from fingervision.rendering.scene import Scene
 
 # Number of points on each piece that bracket its extremum before the refinement.
@@ -136,6 +136,8 @@ def _tip(outline: Outline, axes: Motion) -> _Tip:
         points = axes.before(piece.points(grid))
         place = int(np.argmin(points[:, 1]))
         found.append(points)
+        if isinstance(piece, Line):
+            continue  # its outermost point is an end, which is a point of the grid
 
         def height_px(t: float, piece: Piece = piece) -> float:
             return float(axes.before(piece.points(t))[1])
