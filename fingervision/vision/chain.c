@@ -1,5 +1,6 @@
 /* after finger_shape */
 /* after linear_solve */
+/* after normal_distribution */
 /* Corner of two sides of a chain, each given by a point and the angle of its direction, with a fillet of a radius. */
 static Corner chain_corner(const double *one, const double *two, double radius) {
     Corner c;
@@ -16,48 +17,144 @@ static Corner chain_corner(const double *one, const double *two, double radius) 
     return c;
 }
 
-/* Distance of a point along the normal from the contour of a chain, its derivatives by displacements of the two sides of its
-   corner, and the factor by which they are divided: the uncertainty along the normal. */
+/* A straight piece of a chain's outline: a side, or one of the facets that stand for a fillet. Outward unit normal n, offset
+   n . q, coordinates of its ends along the direction (-n_y, n_x), and how far it moves outward when the two sides of its corner
+   and the radius do. */
 typedef struct {
-    double distance, to_one, to_two, normal_u;
-    int is_on_fillet;
-} Away;
+    double nx, ny, k, begin, end, to_one, to_two, to_radius;
+    int64_t of;
+    int is_facet;
+} Piece;
 
-/* The same from the half-level contour of a blurred corner that is sharp or nearly sharp, and how much of the blur's effect is
-   felt there. Depths are measured from the vertex along the bisector. */
-static Away from_sharp_corner(const Corner *c, double x, double y, double blur, double retreat, double *felt) {
-    double turn = atan2(c->determinant, c->flank_x * c->top_x + c->flank_y * c->top_y), half = 0.5 * turn;
-    double cosine = cos(half), tangent = tan(half), to_vertex = c->radius / cosine;
-    double inward_x = -(c->flank_x + c->top_x) / (2.0 * cosine), inward_y = -(c->flank_y + c->top_y) / (2.0 * cosine);
-    double dx = x - (c->centre_x - to_vertex * inward_x), dy = y - (c->centre_y - to_vertex * inward_y);
-    double depth = dx * inward_x + dy * inward_y, towards_two = dx * inward_y - dy * inward_x;
-    double beside = fabs(towards_two), own = beside * tangent, steep = tangent;
-    if (beside < c->radius * sin(half)) {
-        double on_arc = sqrt(larger(square(c->radius) - square(beside), 1e-12));
-        own = to_vertex - on_arc;
-        steep = beside / on_arc;
+/* Pieces of a chain in their order, each between its intersections with its neighbours. Returns their number. */
+static int64_t pieces_of(const double *sides, const Corner *corners, int64_t count, Piece *pieces) {
+    int64_t n = 0;
+    for (int64_t k = 0; k < count; k++) {
+        const double *one = sides + 3 * k;
+        double nx = sin(one[2]), ny = -cos(one[2]);
+        pieces[n++] = (Piece){nx, ny, nx * one[0] + ny * one[1], -INFINITY, INFINITY, 1.0, 0.0, 0.0, k, 0};
+        if (k == count - 1) break;
+        const Corner *c = &corners[k];
+        double turn = remainder(one[5] - one[2], 2.0 * PI);
+        for (int64_t j = 1; j <= FACETS; j++) {
+            double from_one = turn * (double)j / (FACETS + 1.0);
+            double to_one = sin(turn - from_one) / sin(turn), to_two = sin(from_one) / sin(turn);
+            nx = sin(one[2] + from_one);
+            ny = -cos(one[2] + from_one);
+            double offset = nx * c->centre_x + ny * c->centre_y + c->radius;
+            pieces[n++] = (Piece){nx, ny, offset, 0.0, 0.0, to_one, to_two, 1.0 - to_one - to_two, k, 1};
+        }
     }
-    double along = beside / (blur * cosine);
-    *felt = exp(-FALL * along * along);
-    double blurred = square(retreat * blur) * *felt, contour = sqrt(square(own) + blurred);
-    double slope = (own * steep - blurred * FALL * along / (blur * cosine)) / larger(contour, 1e-9);
-    double tilt = within(towards_two < 0.0 ? -atan(slope) : atan(slope), -half, half), sine = sin(turn);
-    return (Away){(contour - depth) / sqrt(1.0 + square(slope)), sin(half - tilt) / sine, sin(half + tilt) / sine, 0.0, 0};
+    for (int64_t j = 0; j + 1 < n; j++) {
+        Piece *one = &pieces[j], *two = &pieces[j + 1];
+        double determinant = one->nx * two->ny - one->ny * two->nx;
+        double x = (one->k * two->ny - two->k * one->ny) / determinant, y = (one->nx * two->k - two->nx * one->k) / determinant;
+        one->end = x * -one->ny + y * one->nx;
+        two->begin = x * -two->ny + y * two->nx;
+    }
+    return n;
 }
 
-static Away from_corner(const Corner *c, double x, double y, double u, int is_row, double blur, double retreat) {
-    double felt = 0.0, share = within((c->radius / blur - SHARP_BELOW) / (ROUND_ABOVE - SHARP_BELOW), 0.0, 1.0);
-    Spot at = spot(c, x, y);
-    Away found = {at.distance, at.to_flank, at.to_top, 0.0, at.is_on_fillet};
-    if (share > 0.0) found.distance += half_level(c, &at, x - c->centre_x, y - c->centre_y, blur);
-    if (share < 1.0) {
-        Away sharp = from_sharp_corner(c, x, y, blur, retreat, &felt);
-        found.distance = share * found.distance + (1.0 - share) * sharp.distance;
-        found.to_one = share * found.to_one + (1.0 - share) * sharp.to_one;
-        found.to_two = share * found.to_two + (1.0 - share) * sharp.to_two;
+/* Owen's function T(h, t / h): the share of a normal distribution in the plane that lies beyond a line at distance h >= 0, within
+   the angle from the foot of the perpendicular to the point at t along the line (Ann. Math. Stat. 27, 1956, 1075,
+   doi:10.1214/aoms/1177728074). */
+static double owens_t(double h, double t) {
+    static const double at[5] = {0.1488743389816312, 0.4333953941292472, 0.6794095682990244, 0.8650633666889845,
+                                 0.9739065285171717};
+    static const double weight[5] = {0.2955242247147529, 0.2692667193099963, 0.2190863625159820, 0.1494513491505806,
+                                     0.0666713443086881};
+    if (t < 0.0) return -owens_t(h, -t);
+    if (t > h) {
+        double density, near = normal(h, &density), far = normal(t, &density);
+        return t > TABLE_SIGMAS ? 0.5 - 0.5 * near : 0.5 * (near + far) - near * far - owens_t(t, h);
     }
-    found.normal_u = hypot(u * slant(c, &at, is_row), U_CONTOUR_IN_BLURS * blur * felt * (1.0 - share));
-    return found;
+    double steepness = t / larger(h, 1e-300), sum = 0.0;
+    for (int j = 0; j < 10; j++) {
+        double x = 0.5 * steepness * (j % 2 ? 1.0 - at[j / 2] : 1.0 + at[j / 2]), squares = 1.0 + square(x);
+        sum += weight[j / 2] * exp(-0.5 * square(h) * squares) / squares;
+    }
+    return sum * 0.25 * steepness / PI;
+}
+
+/* Number of standard deviations below which a normal distribution has a share. */
+static double normal_quantile(double share, double start) {
+    double z = within(start, -DEEPEST, DEEPEST), density;
+    for (int look = 0; look < 20; look++) {
+        double away = (normal(z, &density) - share) / larger(density, 1e-12);
+        double step = within(away / larger(1.0 + 0.5 * z * away, 0.5), -1.0, 1.0);
+        z -= step;
+        if (fabs(step) < 1e-10) break;
+    }
+    return within(z, -DEEPEST, DEEPEST);
+}
+
+/* Distance of a point along the normal from the contour of a chain, and the factor by which it is divided: the uncertainty
+   along the normal. */
+typedef struct {
+    double distance, normal_u;
+} Away;
+
+/* Whether a point is near the outline and so near one of its corners that the blur mixes two pieces there. */
+static int is_beside_corner(const Piece *pieces, int64_t n, double x, double y, double blur) {
+    double outside = -INFINITY;
+    int is_near = 0;
+    for (int64_t j = 0; j < n; j++) {
+        const Piece *p = &pieces[j];
+        double depth = p->k - p->nx * x - p->ny * y, past = p->nx * y - p->ny * x - p->end;
+        outside = larger(outside, -depth);
+        is_near |= larger(fabs(depth), fabs(past)) < REACH * blur;
+    }
+    return is_near && fabs(outside) < DEEPEST * blur;
+}
+
+/* Exact distance from the half-level contour of a blurred chain. The light is the share of a normal distribution about the point
+   that lies within the chain: the angles under which its pieces are seen, less what lies beyond them, which is a difference of
+   Owen's functions. A displacement of a piece changes the light by the density along it. Where the light rises less steeply than
+   at a straight edge, because normals of several directions are mixed, a straight step does not read the half-level exactly. */
+static Away from_light(const Piece *pieces, int64_t n, const double *sides, const Corner *corners, int64_t count, double x,
+                       double y, double u, int is_row, double blur, double share, double *by) {
+    double angles = PI - (sides[3 * count - 1] - sides[2]), beyond = 0.0, outside = -INFINITY, density;
+    double gradient_x = 0.0, gradient_y = 0.0, weight[MOST_PIECES], moment[MOST_PIECES];
+    for (int64_t j = 0; j < n; j++) {
+        const Piece *p = &pieces[j];
+        double h = (p->k - p->nx * x - p->ny * y) / blur, at = p->nx * y - p->ny * x, inward = h < 0.0 ? -1.0 : 1.0;
+        double from = (p->begin - at) / blur, to = (p->end - at) / blur, d_from, d_to;
+        double span = -normal(from, &d_from) + normal(to, &d_to);
+        outside = larger(outside, -h);
+        angles += inward * (atan2(to, fabs(h)) - atan2(from, fabs(h)));
+        if (fabs(h) < REACH) beyond += inward * (owens_t(fabs(h), to) - owens_t(fabs(h), from));
+        normal(h, &density);
+        weight[j] = density * span;
+        moment[j] = density * (at * span + blur * (d_from - d_to));
+        gradient_x += p->nx * weight[j];
+        gradient_y += p->ny * weight[j];
+    }
+    double gradient = larger(hypot(gradient_x, gradient_y), 1e-12);
+    double z = normal_quantile(angles / (2.0 * PI) - beyond, -outside);
+    normal(z, &density);
+    for (int64_t j = 0; by && j < n; j++) {
+        const Piece *p = &pieces[j];
+        double moved = share * weight[j] / gradient;
+        for (int two = 0; two < 2; two++) {
+            const double *side = sides + 3 * (p->of + two), to = two ? p->to_two : p->to_one;
+            if (moved == 0.0 || to == 0.0) continue;
+            double along = p->is_facet ? corners[p->of].centre_x * cos(side[2]) + corners[p->of].centre_y * sin(side[2])
+                                       : moment[j] / weight[j];
+            by[p->of + two] -= moved * to;
+            by[count + p->of + two] += moved * to * (along - side[0] * cos(side[2]) - side[1] * sin(side[2]));
+        }
+        if (p->is_facet) by[2 * count + p->of] -= moved * p->to_radius;
+    }
+    double steepness = within(gradient / density, LEAST_RISE, 1.0);
+    double slanted = larger(fabs(is_row ? gradient_x : gradient_y) / gradient, LEAST_SLANT);
+    return (Away){-z * blur / steepness, hypot(u * slanted, U_CORNER_IN_BLURS * blur * sqrt(1.0 - square(steepness)))};
+}
+
+/* The same from the nearest side or fillet, which is displaced by half the blur's variance times its curvature. */
+static Away from_fillet(const Corner *c, double x, double y, double u, int is_row, double blur, Spot *at) {
+    *at = spot(c, x, y);
+    double inside = half_level(c, at, x - c->centre_x, y - c->centre_y, blur);
+    return (Away){at->distance + inside, u * slant(c, at, is_row)};
 }
 
 /* Corner to which a point belongs: near a convex outline, the nearest side is the one of which a point lies farthest outside,
@@ -77,54 +174,55 @@ static int64_t corner_of(const double *sides, const Corner *sharp, int64_t count
     return (x - middle_x) * cos(sides[3 * k + 2]) + (y - middle_y) * sin(sides[3 * k + 2]) > 0.0 ? k : k - 1;
 }
 
-/* Distance of a blurred sharp corner's half-level from its vertex, in units of the blur, from values at turns of equal
-   spacing; -1 outside them. */
-static double retreat_of(double turn, const Arg *turns, const Arg *values) {
-    const double *known = (const double *)turns->data, *value = (const double *)values->data;
-    double low = known[0], high = known[turns->n - 1];
-    if (!(turn > low && turn < high)) return -1.0;
-    double at = (turn - low) / (high - low) * (double)(turns->n - 1);
-    int64_t k = smaller_int((int64_t)at, turns->n - 2);
-    return value[k] + (at - (double)k) * (value[k + 1] - value[k]);
-}
-
 /* Distances of the points of a half-level outline from the contour of a blurred chain, in units of their uncertainties, and
    their derivatives by a displacement of every side, by a rotation of every side, and by every radius. The arguments are
-   those of chain_fit. Returns 0 if the sides are not convex. */
-static int from_chain(const Arg *in) {
+   those of chain_fit. A chain that is not blurred is compared where a fit is still far from its end. Returns 0 if the sides are
+   not convex. */
+static int from_chain(const Arg *in, int is_blurred) {
     int64_t count = in[0].n / 3, unknowns = 3 * count - 1;
     const double *sides = FLOATS(0), *radii = FLOATS(1), *blur = FLOATS(7);
-    double retreats[MOST_SIDES];
     Corner corners[MOST_SIDES], wider[MOST_SIDES], sharp[MOST_SIDES];
+    Piece pieces[MOST_PIECES];
     for (int64_t k = 0; k + 1 < count; k++) {
         const double *one = sides + 3 * k, *two = one + 3;
-        retreats[k] = retreat_of(remainder(two[2] - one[2], 2.0 * PI), &in[15], &in[10]);
-        if (retreats[k] < 0.0) return 0;
+        double turn = remainder(two[2] - one[2], 2.0 * PI);
+        if (!(turn > LEAST_TURN && turn < MOST_TURN)) return 0;
         corners[k] = chain_corner(one, two, radii[k]);
         wider[k] = chain_corner(one, two, radii[k] + STEP_PX);
         sharp[k] = chain_corner(one, two, 0.0);
     }
-    memset(FLOATS(13), 0, (size_t)in[13].n * sizeof(double));
+    int64_t n = pieces_of(sides, corners, count, pieces);
+    memset(FLOATS(12), 0, (size_t)in[12].n * sizeof(double));
     for (int64_t i = 0; i < in[3].n; i++) {
-        double x = FLOATS(3)[i], y = FLOATS(4)[i], u = FLOATS(5)[i], *by = FLOATS(13) + i * unknowns;
+        double x = FLOATS(3)[i], y = FLOATS(4)[i], u = FLOATS(5)[i], *by = in[12].n ? FLOATS(12) + i * unknowns : NULL;
         int64_t k = corner_of(sides, sharp, count, x, y);
         const Corner *c = &corners[k];
-        Away at = from_corner(c, x, y, u, FLAGS(6)[i], blur[i], retreats[k]);
-        FLOATS(12)[i] = at.distance / at.normal_u;
-        if (!in[13].n) continue;
-        double wide = from_corner(&wider[k], x, y, u, FLAGS(6)[i], blur[i], retreats[k]).distance;
-        by[2 * count + k] = (wide - at.distance) / (STEP_PX * at.normal_u);
+        double share = within((ROUND_ABOVE - c->radius / blur[i]) / (ROUND_ABOVE - SHARP_BELOW), 0.0, 1.0);
+        if (!is_blurred || (share > 0.0 && !is_beside_corner(pieces, n, x, y, blur[i]))) share = 0.0;
+        Spot at;
+        Away round = from_fillet(c, x, y, u, FLAGS(6)[i], blur[i], &at), found = round;
+        if (share > 0.0) {
+            Away exact = from_light(pieces, n, sides, corners, count, x, y, u, FLAGS(6)[i], blur[i], share, by);
+            found.distance += share * (exact.distance - round.distance);
+            found.normal_u += share * (exact.normal_u - round.normal_u);
+        }
+        FLOATS(11)[i] = found.distance / found.normal_u;
+        if (!by) continue;
+        Spot unused;
+        double wide = from_fillet(&wider[k], x, y, u, FLAGS(6)[i], blur[i], &unused).distance;
+        by[2 * count + k] += (1.0 - share) * (wide - round.distance) / STEP_PX;
         for (int two = 0; two < 2; two++) {
             const double *side = sides + 3 * (k + two);
-            double share = (two ? at.to_two : at.to_one) / at.normal_u, dx = x - side[0], dy = y - side[1];
+            double to = (1.0 - share) * (two ? at.to_top : at.to_flank), dx = x - side[0], dy = y - side[1];
             if (at.is_on_fillet) {
                 /* A rotation of a side moves the centre of its fillet, which lies one radius inside the side. */
                 dx = c->centre_x + c->radius * (two ? c->top_x : c->flank_x) - side[0];
                 dy = c->centre_y + c->radius * (two ? c->top_y : c->flank_y) - side[1];
             }
-            by[k + two] = -share;
-            by[count + k + two] = share * (dx * cos(side[2]) + dy * sin(side[2]));
+            by[k + two] -= to;
+            by[count + k + two] += to * (dx * cos(side[2]) + dy * sin(side[2]));
         }
+        for (int64_t a = 0; a < unknowns; a++) by[a] /= found.normal_u;
     }
     return 1;
 }
@@ -132,7 +230,7 @@ static int from_chain(const Arg *in) {
 /* Weighted squares and products of the derivatives, and of derivatives and distances, with the priors of all unknowns. */
 static void weighed_chain(const Arg *in, double patience, const double *away, const double *prior, double *information,
                           double *gradient) {
-    int64_t unknowns = in[14].n;
+    int64_t unknowns = in[13].n;
     double variance = in[9].d;
     memset(information, 0, (size_t)(unknowns * unknowns) * sizeof(double));
     for (int64_t a = 0; a < unknowns; a++) {
@@ -140,8 +238,8 @@ static void weighed_chain(const Arg *in, double patience, const double *away, co
         gradient[a] = prior[a] * away[a];
     }
     for (int64_t i = 0; i < in[3].n; i++) {
-        const double *by = FLOATS(13) + i * unknowns;
-        double residual = FLOATS(12)[i], squares = square(residual / patience) / variance;
+        const double *by = FLOATS(12) + i * unknowns;
+        double residual = FLOATS(11)[i], squares = square(residual / patience) / variance;
         double weight = 1.0 / (variance * (1.0 + exp(smaller(0.5 * (squares - DUST), 50.0))));
         for (int64_t a = 0; a < unknowns; a++) {
             if (by[a] == 0.0) continue;
@@ -154,22 +252,23 @@ static void weighed_chain(const Arg *in, double patience, const double *away, co
 }
 
 /* Fit of a chain by Gauss-Newton steps. Arguments: sides (n, 3) and radii (n - 1), which are replaced; standard deviations of
-   the priors (m); x, y, u, is_row, blur; patience of every step; factor on the variances; retreats of blurred sharp
-   corners; results, information (m, m) with m = 3 n - 1, residuals, derivatives (points, m; or
-   none, and no information, where only the residuals are wanted),
-   and how far every unknown is from its prior's mean (m); turns of
-   the blurred corners. Returns whether the sides are convex. */
-LOOP(chain_fit, "ffFFFFBFFdFffffF", "b") {
+   the priors (m); x, y, u, is_row, blur; patience of every step; factor on the variances; results, information (m, m) with
+   m = 3 n - 1, residuals, derivatives (points, m; or none, and no information, where only the residuals are wanted), and how far
+   every unknown is from its prior's mean (m). Returns whether the sides are convex. */
+LOOP(chain_fit, "ffFFFFBFFdffff", "b") {
     int64_t count = in[0].n / 3, unknowns = 3 * count - 1;
-    double *sides = FLOATS(0), *radii = FLOATS(1), *away = FLOATS(14), *information = FLOATS(11);
+    double *sides = FLOATS(0), *radii = FLOATS(1), *away = FLOATS(13), *information = FLOATS(10);
     double prior[3 * MOST_SIDES], gradient[3 * MOST_SIDES], matrix[9 * MOST_SIDES * MOST_SIDES];
     for (int64_t a = 0; a < unknowns; a++) {
         prior[a] = 1.0 / square(FLOATS(2)[a]);
         away[a] = a < 2 * count ? 0.0 : radii[a - 2 * count];
     }
-    out[0].i = from_chain(in);
-    for (int64_t look = 0; look < in[8].n && out[0].i; look++) {
+    for (int64_t look = 0; look < in[8].n; look++) {
         double patience = FLOATS(8)[look], most = MOST_TURNED, length = 0.0;
+        if (!from_chain(in, patience == 1.0)) {
+            out[0].i = 0;
+            return;
+        }
         weighed_chain(in, patience, away, prior, information, gradient);
         memcpy(matrix, information, (size_t)(unknowns * unknowns) * sizeof(double));
         double step[3 * MOST_SIDES];
@@ -191,8 +290,8 @@ LOOP(chain_fit, "ffFFFFBFFdFffffF", "b") {
             side[2] += step[count + k];
         }
         for (int64_t k = 0; k + 1 < count; k++) radii[k] = away[2 * count + k] = larger(away[2 * count + k], 0.0);
-        out[0].i = from_chain(in);
         if (patience == 1.0 && length < SETTLED) break;
     }
-    if (in[13].n) weighed_chain(in, 1.0, away, prior, information, gradient);
+    out[0].i = from_chain(in, 1);
+    if (in[12].n) weighed_chain(in, 1.0, away, prior, information, gradient);
 }

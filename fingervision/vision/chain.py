@@ -2,9 +2,10 @@
 
 All corners have a radius, from sharp to a fillet as wide as the finger, so that rounded, square, slanted and chamfered
 ends are one family, which differs in the number of sides. The points are compared with the half-level contour of the
-blurred chain. A point is either on the outline or dust, with prior odds that do not depend on the shape; the weights of
-the fit are the posterior probabilities that points are on the outline (expectation and maximisation: Dempster, Laird
-and Rubin, J. R. Stat. Soc. B 39, 1977, doi:10.1111/j.2517-6161.1977.tb01600.x).
+blurred chain, which is exact for any number of sides; only fillets of more than a few sigma are approximated. A point
+is either on the outline or dust, with prior odds that do not depend on the shape; the weights of the fit are the
+posterior probabilities that points are on the outline (expectation and maximisation: Dempster, Laird and Rubin, J. R.
+Stat. Soc. B 39, 1977, doi:10.1111/j.2517-6161.1977.tb01600.x).
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from fingervision.vision.finger_end import FingerEnd
 from fingervision.vision.finger_shape import INNER_C, INNER_M, INNER_R, OUTER_C, OUTER_M, OUTER_R, TOP_C, TOP_M
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
-from fingervision.vision.polygon import TURNS, Polygon, Side, corner_retreats
+from fingervision.vision.polygon import Polygon, Side
 
 Floats = NDArray[np.float64]
 
@@ -28,10 +29,19 @@ Floats = NDArray[np.float64]
 MOST_SIDES = 5
 # Radii (in sigma) below which a corner's contour is that of a sharp corner, and above which it is that of a fillet.
 SHARP_BELOW, ROUND_ABOVE = 1.0, 3.0
-# Standard uncertainty (in sigma) of a point at a sharp corner, where the fit of a straight step does not read the
-# half-level, and coefficient c of the decrease exp(-c s^2) of the blur's effect
-# along the sides, s in sigma, which fits the exact half-level of a right-angled corner between 0.5 and 2.
-U_CONTOUR_IN_BLURS, FALL = 0.2, 0.4
+# Straight pieces that stand for a fillet of such a radius, and pieces of the longest chain.
+FACETS, MOST_PIECES = 3, 17
+# Distance (in sigma) from a corner beyond which its blur is not felt, and from the outline where points are dust.
+REACH, DEEPEST = 6.0, 5.0
+# Standard uncertainty (in sigma) with which a straight step reads the light where it comes from two sides at right
+# angles to each other. The outward normals of what a point sees have a spread of directions (1 - g^2)^(1/2), with g the
+# steepness of the light as a share of that at a straight edge, and the uncertainty is proportional to it. It is so
+# large because all lines at a corner share their error.
+U_CORNER_IN_BLURS = 0.28
+# Least steepness of the light at a point of the contour, as a share of that at a straight edge.
+LEAST_RISE = 0.1
+# Least and largest change of direction between neighbouring sides (radians) of a convex chain.
+LEAST_TURN, MOST_TURN = 0.03, 2.6
 # Step of the numerical derivatives (pixels; radians for a rotation).
 STEP_PX, STEP_RAD = 1e-4, 1e-6
 # Squared residual (in variances) at which a point is as likely dust as a part of the outline.
@@ -140,8 +150,8 @@ def fit_chain(
     unknowns = u_prior.size
     information, jacobian = np.empty((unknowns, unknowns)), np.empty((points.x.size, unknowns))
     residual, away = np.empty(points.x.size), np.empty(unknowns)
-    how = (np.array(patience, dtype=np.float64), variance, corner_retreats())
-    if not _fit(sides, radii, u_prior, *_seen(points), *how, information, residual, jacobian, away, TURNS):
+    how = (np.array(patience, dtype=np.float64), variance)
+    if not _fit(sides, radii, u_prior, *_seen(points), *how, information, residual, jacobian, away):
         return None
     polygon = Polygon([Side(*side) for side in sides.tolist()], radii.tolist(), None)
     if patience and not polygon.is_chain():
@@ -168,17 +178,18 @@ def with_small_radii(points: OutlinePoints, chain: Chain, variance: float) -> Ch
     blur, covariance = float(points.blur[0]), chain.covariance.copy()
     log_evidence = chain.log_evidence
     u_prior, away, nothing = np.ones(3 * count - 1), np.empty(3 * count - 1), np.empty((0, 0))
-    residual, how = np.empty(points.x.size), (np.empty(0), variance, corner_retreats())
+    residual, how = np.empty(points.x.size), (np.empty(0), variance)
     for k, radius in enumerate(radii):
         if radius >= ROUND_ABOVE * blur:
             continue
         tried, misfit = SMALL_RADII * blur, []
         for other in tried.tolist():
             changed = np.array([*radii[:k], other, *radii[k + 1 :]])
-            _fit(np.array(sides), changed, u_prior, *_seen(points), *how, nothing, residual, nothing, away, TURNS)
-            misfit.append(_misfit(residual, variance) + (other / chain.u_radii[k]) ** 2)
+            is_chain = _fit(np.array(sides), changed, u_prior, *_seen(points), *how, nothing, residual, nothing, away)
+            misfit.append(_misfit(residual, variance) + (other / chain.u_radii[k]) ** 2 if is_chain else np.inf)
         likely = np.exp(-0.5 * (np.array(misfit) - min(misfit)))
         square = np.trapezoid(likely * (tried - radius) ** 2, tried) / np.trapezoid(likely, tried)
+        square = max(square, tried[1] ** 2 / 12.0)  # between two of the radii nothing is known
         place = 2 * count + k
         log_evidence += 0.5 * float(np.log(square / covariance[place, place]))
         covariance[place, :] = covariance[:, place] = 0.0

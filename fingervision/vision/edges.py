@@ -43,6 +43,8 @@ BLUR_PASSES, MORE_PASSES, SETTLED_PX = 2, 8, 0.2
 UNLIKE, MOST_OF_OTHER = 0.15, 0.7
 # Index of the blur of every line: the lines of a finger's flanks have one blur, those of its tip another.
 BLUR_OF_LINE = np.concatenate((np.where(IS_ROW, 0, 1), np.where(IS_ROW, 2, 3)))
+# Number of pixels at the outer end of a line over which the ground's level is averaged.
+GROUND_PX = 2
 # Variance of rounding to whole grey levels, the least noise.
 ROUNDING = 1.0 / 12.0
 
@@ -79,6 +81,8 @@ class EdgePoints:
         Deviation of each inner flank from a blurred step; zero if the window contains both fingers' edges.
     inside : (float, float)
         Level of each finger next to its inner flank.
+    ground : ndarray of float
+        Level at the outer end of every line.
     shared_lines : float
         Number of neighbouring lines that share their noise.
     shared_on_both : float
@@ -101,6 +105,7 @@ class EdgePoints:
     reach_px: int
     marks: tuple[EdgeMark, EdgeMark]
     inside: tuple[float, float]
+    ground: Floats
     shared_lines: float = 1.0
     shared_on_both: float = 1.0
     noise_flat: float = 0.0
@@ -207,6 +212,7 @@ def _fit(
         filters.reach_px,
         marks,
         (_inside(levels[0], lines.weight[0]), _inside(levels[1], lines.weight[1])),
+        levels[..., -GROUND_PX:].mean(axis=-1),
         *flat_noise(upright, light, lines, filters, *filters.middle(blur[0])),
     )
 

@@ -26,6 +26,7 @@ from fingervision.vision.chain import (
     with_small_radii,
 )
 from fingervision.vision.finger_end import FingerEnd
+from fingervision.vision.finger_shape import INNER_R, OUTER_R, SHARP_IN_BLURS
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
 from fingervision.vision.polygon import Side
@@ -48,7 +49,7 @@ STRAIGHTEST = 3.0
 # Largest share of the points that may be dust; with more, the outline has another shape.
 MOST_DUST = 0.04
 # Logarithm of the evidence by which the fit of fillets may fall behind the same shape's chain and still be taken: its
-# contour of a nearly sharp corner is another approximation.
+# contour is another approximation.
 LOST = 2.0
 # Factor on the variance between shapes, because both fingers have corners of the same kind and hence equal errors.
 BOTH_ALIKE = 2.0
@@ -102,7 +103,7 @@ def likely_points(
             for p, own in zip(points, shapes, strict=True)
         ]
     own_fits = [
-        None if known is None else fit_chain(p, _starts(p, end)[0], variance, ())
+        None if known is None or _has_sharp_corner(p, end) else fit_chain(p, _starts(p, end)[0], variance, ())
         for p, end, known in zip(points, ends, fitted, strict=True)
     ]
     is_own = []
@@ -117,6 +118,12 @@ def likely_points(
         for p, own, shares, known, is_same in zip(points, shapes, _probabilities(shapes), fitted, is_own, strict=True)
     ]
     return LikelyPoints(found, sqrt(variance / shared))
+
+
+def _has_sharp_corner(points: OutlinePoints, end: FingerEnd) -> bool:
+    """Whether the fit of fillets leaves the points at a corner out, so that it does not know the corner's radius."""
+    smallest: float = min(end.parameters[[INNER_R, OUTER_R]].tolist())
+    return smallest < SHARP_IN_BLURS * float(points.blur.max())
 
 
 def _starts(points: OutlinePoints, end: FingerEnd) -> list[Start]:
@@ -137,7 +144,8 @@ def _shapes(points: OutlinePoints, starts: list[Start], variance: float) -> Shap
     square = fit_chain(points, starts[-1], variance, ())
     bases = [base for base in (whole, square) if base is not None]
     inner, outer = (_best(points, [_cut(points, base, corner) for base in bases], variance) for corner in (1, 0))
-    starts = [_cut(points, base, corner) for base, corner in ((inner, 0), (outer, 2)) if base is not None]
+    square = None if square is None else fit_chain(points, _cut(points, square, 1), variance, ())
+    starts = [_cut(points, base, corner) for base, corner in ((inner, 0), (square, 0), (outer, 2)) if base is not None]
     return [whole, inner, outer, _best(points, starts, variance)]
 
 

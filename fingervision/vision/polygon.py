@@ -1,15 +1,7 @@
-"""A finger's end as a convex chain of straight sides with rounded corners: positions of its tip and inner edge.
+"""A finger's end as a convex chain of straight sides with rounded corners: positions of its tip and inner edge."""
 
-Distance between a blurred corner's half-level contour and the vertex of the corner.
-"""
-
-from functools import cache
 from math import cos, pi, sin, sqrt, tan
 from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
-from scipy.special import ndtr, owens_t
 
 # Least and largest change of direction between neighbouring sides (radians) of a convex chain.
 LEAST_TURN, MOST_TURN = 0.03, 2.6
@@ -148,27 +140,3 @@ class _Ends(NamedTuple):
             first.append(begin)
             last.append(end)
         return cls(first, last, centres)
-
-
-Floats = NDArray[np.float64]
-
-# Turns (radians) for which a sharp corner's half-level is computed; between them it is interpolated to 1e-4 sigma.
-TURNS: Floats = np.linspace(LEAST_TURN, MOST_TURN, 261)
-# Number of halvings of the interval that contains the half-level.
-HALVINGS = 30
-
-
-@cache
-def corner_retreats() -> Floats:
-    """Distance of the half-level from the vertex of blurred sharp corners of all `TURNS`, along the bisector, in sigma.
-
-    At a depth a (in sigma) inside both sides of a wedge whose sides turn by theta, the blurred coverage is Phi(a) - 2
-    T(a, tan(theta / 2)), with T Owen's function (Ann. Math. Stat. 27, 1956, doi:10.1214/aoms/1177728074); the
-    half-level is where the coverage equals one half.
-    """
-    low, high = np.zeros(TURNS.size), np.full(TURNS.size, 6.0)
-    for _halving in range(HALVINGS):
-        depth = 0.5 * (low + high)
-        is_outside = ndtr(depth) - 2.0 * owens_t(depth, np.tan(0.5 * TURNS)) < 0.5
-        low, high = np.where(is_outside, depth, low), np.where(is_outside, high, depth)
-    return np.asarray(0.5 * (low + high) / np.cos(0.5 * TURNS))

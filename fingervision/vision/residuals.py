@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fingervision.domain.frame import Coding
 from fingervision.domain.loops import loop
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import INNER_R, OUTER_R, PARAMETERS, TOP_M
+from fingervision.vision.finger_shape import INNER_R, OUTER_R, PARAMETERS, TOP_M, compared, seen
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
 
@@ -127,7 +127,11 @@ def set_aside_variance(points: OutlinePoints, end: FingerEnd, edge: float, heigh
     The errors of the two fingers may be fully correlated. Each finger's variance is therefore doubled, so that the
     variance of the gap is large enough (JCGM 100:2008, 4.3.7 and 5.2.2).
     """
-    return float(2.0 / 3.0 * _set_aside(points.x, points.y, points.u, end.residual, end.robust, edge, height) ** 2)
+    place = (end.parameters, end.origin, points.x, points.y)
+    is_outer, _ = seen(*place, points.is_row)
+    _, _, counts = compared(*place, points.u, points.is_row, is_outer, points.blur)
+    residual = np.where(counts, end.residual, 0.0)  # a point that a sharp corner blurs says nothing about the edge
+    return float(2.0 / 3.0 * _set_aside(points.x, points.y, points.u, residual, end.robust, edge, height) ** 2)
 
 
 def is_open(points: OutlinePoints, end: FingerEnd, found: MeasuringPoint, below_tip_px: float, shared: float) -> bool:

@@ -10,16 +10,17 @@ import pytest
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.path import Path as Outline
 from matplotlib.transforms import IdentityTransform
-from scipy.stats import multivariate_normal
+from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.stats import multivariate_normal, norm
 
 from fingervision.domain.frame import Frame
 from fingervision.domain.gap import GapMeasurement
 from fingervision.vision.chain import U_PLACE_PX, Start, fit_chain
 from fingervision.vision.finger_end import fit_from_any_radius
 from fingervision.vision.first_guess import first_guess
-from fingervision.vision.outline_points import OutlinePoints
+from fingervision.vision.outline_points import OutlinePoints, finger_origin, outline_points
 from fingervision.vision.outline_shapes import likely_points
-from fingervision.vision.pipeline import measure_frame
+from fingervision.vision.pipeline import measure_frame, steps_alone
 from fingervision.vision.polygon import Side
 from fingervision.vision.profile_lines import INNER_SIDE, OUTER_SIDE, TIP_SIDE
 from fingervision.vision.settings import Settings
@@ -122,7 +123,28 @@ def test_the_contour_of_a_sharp_corner_is_that_of_the_bivariate_normal(turn: flo
     points = OutlinePoints(np.zeros(1), y, np.ones(1), np.full(1, TIP_SIDE), np.ones(1))
     chain = fit_chain(points, Start(sides, [0.0], [U_PLACE_PX] * 2, [3.0]), 1.0, ())
     assert chain is not None
-    assert chain.residual == pytest.approx(np.zeros(1), abs=3e-3)
+    assert chain.residual == pytest.approx(np.zeros(1), abs=1e-6)
+
+
+@pytest.mark.parametrize("leg_px", [0.3125, 1.0125, 3.0125])  # between the raster's diagonals
+def test_the_contour_of_a_cut_is_that_of_its_blurred_picture(leg_px: float) -> None:
+    """Also where the cut is shorter than the blur, so that its corners have no contour of their own."""
+    fine, blur_px = 40, 1.0
+    x, y = np.meshgrid(*2 * [(np.arange(20 * fine) + 0.5) / fine - 10.0])
+    is_inside = (x < 0.0) & (y > 0.0) & (y - x > leg_px)
+    light = gaussian_filter(is_inside.astype(np.float64), blur_px * fine)
+    along = np.linspace(-3.0, 3.0, 25)
+    depth = np.linspace(-1.0, 4.0, 2001)[:, None]  # on lines at 45 degrees, between the two sides
+    px, py = 0.5 * along - depth / np.sqrt(2.0), 0.5 * along + depth / np.sqrt(2.0)
+    seen = map_coordinates(light, [(py + 10.0) * fine - 0.5, (px + 10.0) * fine - 0.5], order=1)
+    at = np.array([np.interp(0.5, seen[:, k], depth[:, 0]) for k in range(along.size)])
+    px, py = 0.5 * along - at / np.sqrt(2.0), 0.5 * along + at / np.sqrt(2.0)
+    sides = [Side(-leg_px, 0.0, 0.0), Side(-leg_px, 0.0, 0.25 * pi), Side(0.0, leg_px, 0.5 * pi)]
+    u_px = np.full(along.size, 10.0)  # beside which that of a corner is nothing
+    points = OutlinePoints(px, py, u_px, np.full(along.size, TIP_SIDE), np.full(along.size, blur_px))
+    chain = fit_chain(points, Start(sides, [0.0, 0.0], [U_PLACE_PX] * 3, [3.0] * 2), 1.0, ())
+    assert chain is not None
+    assert np.abs(chain.residual * u_px).max() < 2e-3
 
 
 def _filled(fingers: list[np.ndarray], rng: np.random.Generator, noise: float = 2.0) -> np.ndarray:
@@ -191,3 +213,31 @@ def test_chamfered_fingers_before_a_turned_camera_are_measured(leg_px: float, tu
     outcome = measure_frame(Frame(_filled(fingers, rng), 0), Settings(below_tip_px=BELOW_PX))
     assert isinstance(outcome, GapMeasurement), outcome.words
     assert abs(outcome.gap_px - truth) < 3.0 * float(np.hypot(outcome.u_gap_px, outcome.u_shift_px))
+
+
+@pytest.mark.parametrize("turned_deg", [3.0, 9.0])
+def test_lines_beside_a_corner_read_the_half_level_of_the_whole_finger(turned_deg: float) -> None:
+    """A line that crosses a flank beside the corner runs along the top, and a step fitted to it is up to a blur away.
+
+    The light at depths a and b inside the sides of a right-angled corner is Phi(a) Phi(b).
+    """
+    turn, w, half_gap = np.radians(turned_deg), 60.0, 47.3
+    box = np.array([(0.0, LENGTH_PX), (0.0, 0.0), (w, 0.0), (w, LENGTH_PX)])
+    fingers = [_turned(box + np.array([start, 0.0]), turn) for start in (-half_gap - w, half_gap)]
+    seen = steps_alone(Frame(_filled(fingers, np.random.default_rng(5), 0.5), 0), Settings(below_tip_px=BELOW_PX))
+    assert seen is not None
+    (_, edges), _, coarse = seen
+    for finger, points, inner in zip(
+        (coarse.left, coarse.right), outline_points(coarse, edges), (-1.0, 1.0), strict=True
+    ):
+        across, along = finger_origin(finger)
+        place = np.column_stack([finger.inner_sign * points.x + across, points.y + along]) - CENTRE
+        x, below = (place @ np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])).T
+        inside = (inner * x - half_gap) / BLUR_PX
+        depth = below / BLUR_PX
+        light = norm.cdf(inside) * norm.cdf(depth)
+        slope = np.hypot(norm.pdf(inside) * norm.cdf(depth), norm.cdf(inside) * norm.pdf(depth))
+        is_beside = (np.hypot(inside, depth) < 5.0) & (points.u < 0.5 * BLUR_PX)
+        away_in_blurs = np.abs(light - 0.5)[is_beside] / slope[is_beside]
+        assert away_in_blurs.size >= 4
+        assert away_in_blurs.max() < 0.15
