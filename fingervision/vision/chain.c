@@ -17,6 +17,11 @@ static Corner chain_corner(const double *one, const double *two, double radius) 
     return c;
 }
 
+/* Component of a vector along the first or the second side of a corner. */
+static double along_side(const Corner *c, int two, double x, double y) {
+    return two ? c->top_x * y - c->top_y * x : c->flank_x * y - c->flank_y * x;
+}
+
 /* A straight piece of a chain's outline: a side, or one of the facets that stand for a fillet. Outward unit normal n, offset
    n . q, coordinates of its ends along the direction (-n_y, n_x), and how far it moves outward when the two sides of its corner
    and the radius do. */
@@ -36,7 +41,7 @@ static int64_t pieces_of(const double *sides, const Corner *corners, int64_t cou
         if (k == count - 1) break;
         const Corner *c = &corners[k];
         double turn = remainder(one[5] - one[2], 2.0 * PI);
-        for (int64_t j = 1; j <= FACETS; j++) {
+        for (int64_t j = 1; j <= FACETS && c->radius > 0.0; j++) {
             double from_one = turn * (double)j / (FACETS + 1.0);
             double to_one = sin(turn - from_one) / sin(turn), to_two = sin(from_one) / sin(turn);
             nx = sin(one[2] + from_one);
@@ -119,10 +124,12 @@ static Away from_light(const Piece *pieces, int64_t n, const double *sides, cons
         const Piece *p = &pieces[j];
         double h = (p->k - p->nx * x - p->ny * y) / blur, at = p->nx * y - p->ny * x, inward = h < 0.0 ? -1.0 : 1.0;
         double from = (p->begin - at) / blur, to = (p->end - at) / blur, d_from, d_to;
-        double span = -normal(from, &d_from) + normal(to, &d_to);
         outside = larger(outside, -h);
         angles += inward * (atan2(to, fabs(h)) - atan2(from, fabs(h)));
-        if (fabs(h) < REACH) beyond += inward * (owens_t(fabs(h), to) - owens_t(fabs(h), from));
+        weight[j] = moment[j] = 0.0;
+        if (!(fabs(h) < REACH && from < REACH && to > -REACH)) continue;
+        double span = -normal(from, &d_from) + normal(to, &d_to);
+        beyond += inward * (owens_t(fabs(h), to) - owens_t(fabs(h), from));
         normal(h, &density);
         weight[j] = density * span;
         moment[j] = density * (at * span + blur * (d_from - d_to));
@@ -136,12 +143,14 @@ static Away from_light(const Piece *pieces, int64_t n, const double *sides, cons
         const Piece *p = &pieces[j];
         double moved = share * weight[j] / gradient;
         for (int two = 0; two < 2; two++) {
-            const double *side = sides + 3 * (p->of + two), to = two ? p->to_two : p->to_one;
+            double to = two ? p->to_two : p->to_one;
+            const double *side = sides + 3 * (p->of + two);
             if (moved == 0.0 || to == 0.0) continue;
-            double along = p->is_facet ? corners[p->of].centre_x * cos(side[2]) + corners[p->of].centre_y * sin(side[2])
-                                       : moment[j] / weight[j];
+            double along = moment[j] / weight[j] + p->ny * side[0] - p->nx * side[1];
+            const Corner *c = &corners[p->of];
+            if (p->is_facet) along = along_side(c, two, c->centre_x - side[0], c->centre_y - side[1]);
             by[p->of + two] -= moved * to;
-            by[count + p->of + two] += moved * to * (along - side[0] * cos(side[2]) - side[1] * sin(side[2]));
+            by[count + p->of + two] += moved * to * along;
         }
         if (p->is_facet) by[2 * count + p->of] -= moved * p->to_radius;
     }
@@ -150,16 +159,33 @@ static Away from_light(const Piece *pieces, int64_t n, const double *sides, cons
     return (Away){-z * blur / steepness, hypot(u * slanted, U_CORNER_IN_BLURS * blur * sqrt(1.0 - square(steepness)))};
 }
 
-/* The same from the nearest side or fillet, which is displaced by half the blur's variance times its curvature. */
-static Away from_fillet(const Corner *c, double x, double y, double u, int is_row, double blur, Spot *at) {
-    *at = spot(c, x, y);
-    double inside = half_level(c, at, x - c->centre_x, y - c->centre_y, blur);
-    return (Away){at->distance + inside, u * slant(c, at, is_row)};
+/* The same from the nearest side or fillet of a corner, which is displaced by half the blur's variance times its curvature. The
+   derivative by the radius is taken from a corner whose radius is larger by STEP_PX. */
+static Away from_fillet(const Corner *c, const Corner *wider, const double *sides, double x, double y, double u, int is_row,
+                        double blur, double share, double *by, int64_t count) {
+    Spot at = spot(c, x, y);
+    Away found = {at.distance + half_level(c, &at, x - c->centre_x, y - c->centre_y, blur), u * slant(c, &at, is_row)};
+    if (!by) return found;
+    Spot wide = spot(wider, x, y);
+    double outside = wide.distance + half_level(wider, &wide, x - wider->centre_x, y - wider->centre_y, blur);
+    by[2 * count] += share * (outside - found.distance) / STEP_PX;
+    for (int two = 0; two < 2; two++) {
+        const double *side = sides + 3 * two;
+        double to = share * (two ? at.to_top : at.to_flank), dx = x - side[0], dy = y - side[1];
+        if (at.is_on_fillet) {
+            /* A rotation of a side moves the centre of its fillet, which lies one radius inside the side. */
+            dx = c->centre_x + c->radius * (two ? c->top_x : c->flank_x) - side[0];
+            dy = c->centre_y + c->radius * (two ? c->top_y : c->flank_y) - side[1];
+        }
+        by[two] -= to;
+        by[count + two] += to * along_side(c, two, dx, dy);
+    }
+    return found;
 }
 
 /* Corner to which a point belongs: near a convex outline, the nearest side is the one of which a point lies farthest outside,
    and the nearest corner is at that end of the side which is on the point's side of its middle. */
-static int64_t corner_of(const double *sides, const Corner *sharp, int64_t count, double x, double y) {
+static int64_t corner_of(const Corner *sharp, int64_t count, double x, double y) {
     int64_t k = 0;
     double outside = -INFINITY;
     for (int64_t s = 0; s < count; s++) {
@@ -171,7 +197,7 @@ static int64_t corner_of(const double *sides, const Corner *sharp, int64_t count
     if (k == 0 || k == count - 1) return k ? k - 1 : 0;
     double middle_x = 0.5 * (sharp[k - 1].centre_x + sharp[k].centre_x);
     double middle_y = 0.5 * (sharp[k - 1].centre_y + sharp[k].centre_y);
-    return (x - middle_x) * cos(sides[3 * k + 2]) + (y - middle_y) * sin(sides[3 * k + 2]) > 0.0 ? k : k - 1;
+    return (middle_x - x) * sharp[k].flank_y + (y - middle_y) * sharp[k].flank_x > 0.0 ? k : k - 1;
 }
 
 /* Distances of the points of a half-level outline from the contour of a blurred chain, in units of their uncertainties, and
@@ -195,34 +221,23 @@ static int from_chain(const Arg *in, int is_blurred) {
     memset(FLOATS(12), 0, (size_t)in[12].n * sizeof(double));
     for (int64_t i = 0; i < in[3].n; i++) {
         double x = FLOATS(3)[i], y = FLOATS(4)[i], u = FLOATS(5)[i], *by = in[12].n ? FLOATS(12) + i * unknowns : NULL;
-        int64_t k = corner_of(sides, sharp, count, x, y);
+        int64_t k = corner_of(sharp, count, x, y);
         const Corner *c = &corners[k];
         double share = within((ROUND_ABOVE - c->radius / blur[i]) / (ROUND_ABOVE - SHARP_BELOW), 0.0, 1.0);
         if (!is_blurred || (share > 0.0 && !is_beside_corner(pieces, n, x, y, blur[i]))) share = 0.0;
-        Spot at;
-        Away round = from_fillet(c, x, y, u, FLAGS(6)[i], blur[i], &at), found = round;
+        Away found = {0.0, 0.0};
         if (share > 0.0) {
             Away exact = from_light(pieces, n, sides, corners, count, x, y, u, FLAGS(6)[i], blur[i], share, by);
-            found.distance += share * (exact.distance - round.distance);
-            found.normal_u += share * (exact.normal_u - round.normal_u);
+            found = (Away){share * exact.distance, share * exact.normal_u};
+        }
+        if (share < 1.0) {
+            Away round = from_fillet(c, &wider[k], sides + 3 * k, x, y, u, FLAGS(6)[i], blur[i], 1.0 - share, by ? by + k : NULL,
+                                     count);
+            found.distance += (1.0 - share) * round.distance;
+            found.normal_u += (1.0 - share) * round.normal_u;
         }
         FLOATS(11)[i] = found.distance / found.normal_u;
-        if (!by) continue;
-        Spot unused;
-        double wide = from_fillet(&wider[k], x, y, u, FLAGS(6)[i], blur[i], &unused).distance;
-        by[2 * count + k] += (1.0 - share) * (wide - round.distance) / STEP_PX;
-        for (int two = 0; two < 2; two++) {
-            const double *side = sides + 3 * (k + two);
-            double to = (1.0 - share) * (two ? at.to_top : at.to_flank), dx = x - side[0], dy = y - side[1];
-            if (at.is_on_fillet) {
-                /* A rotation of a side moves the centre of its fillet, which lies one radius inside the side. */
-                dx = c->centre_x + c->radius * (two ? c->top_x : c->flank_x) - side[0];
-                dy = c->centre_y + c->radius * (two ? c->top_y : c->flank_y) - side[1];
-            }
-            by[k + two] -= to;
-            by[count + k + two] += to * (dx * cos(side[2]) + dy * sin(side[2]));
-        }
-        for (int64_t a = 0; a < unknowns; a++) by[a] /= found.normal_u;
+        for (int64_t a = 0; by && a < unknowns; a++) by[a] /= found.normal_u;
     }
     return 1;
 }

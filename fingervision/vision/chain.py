@@ -48,7 +48,7 @@ STEP_PX, STEP_RAD = 1e-4, 1e-6
 DUST = 9.0
 # Steps of a fit that begins where another ended: factors on the standard uncertainties of the points. A fit from an
 # initial estimate has other steps before them, the first of which tolerates errors of so many pixels.
-SETTLING, STARTING, TOLERATED_PX = (1.0,) * 8, 5, 3.0
+SETTLING, STARTING, TOLERATED_PX = (1.0,) * 20, 5, 3.0
 # Standard deviations of the priors: of the place of a flank or top (pixels), of a side's rotation (radians), and of the
 # radius of a corner that is cut or sharp (pixels).
 U_PLACE_PX, U_ANGLE, U_SHARP_PX = 30.0, 0.3, 3.0

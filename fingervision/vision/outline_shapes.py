@@ -40,6 +40,8 @@ SHAPES, ALIKE = np.array([0.45, 0.05, 0.05, 0.45]), 0.9
 # Least number of points that a shape leaves at a corner for a line through them; else legs of the cut with which a fit
 # begins, in radii of the fillet of the same area, which is at least so large (pixels).
 FEWEST_OF_CUT, LEGS_IN_RADII, SHARP_PX = 4, 0.655, 6.0
+# Radius of the fillets of a round end with which a fit begins, in half widths of the finger.
+ROUND_END = 0.95
 # Distance of a cut from its corner, in radii of the fillet of the same area.
 CUT_IN_RADII = 0.463
 # Probability below which a shape is left out, and below which this is certain before the radii are integrated over.
@@ -127,7 +129,7 @@ def _has_sharp_corner(points: OutlinePoints, end: FingerEnd) -> bool:
 
 
 def _starts(points: OutlinePoints, end: FingerEnd) -> list[Start]:
-    """Beginnings of the fits: the shape with fillets, the same with sharp corners, and a top square to the flanks."""
+    """Beginnings of the fits: the shape with fillets, the same with sharp corners, a round end, and a square one."""
     sides, radii = three_sides(end)
     wide = 0.5 * abs(sides[2].x - sides[0].x)
     angle = 0.5 * (sides[0].angle + sides[2].angle)
@@ -135,7 +137,9 @@ def _starts(points: OutlinePoints, end: FingerEnd) -> list[Start]:
     top = Side(float(points.x[outermost]), float(points.y[outermost]), angle)
     places = [U_PLACE_PX] * 3
     sharp = ([1.0, 1.0], places, [U_SHARP_PX, U_SHARP_PX])
-    return [Start(sides, radii, places, [wide, wide]), Start(sides, *sharp), Start([sides[0], top, sides[2]], *sharp)]
+    round_end = Start([sides[0], top, sides[2]], [ROUND_END * wide] * 2, places, [wide, wide])
+    square_end = Start([sides[0], top, sides[2]], *sharp)
+    return [Start(sides, radii, places, [wide, wide]), Start(sides, *sharp), round_end, square_end]
 
 
 def _shapes(points: OutlinePoints, starts: list[Start], variance: float) -> Shapes:

@@ -3,13 +3,8 @@
 from itertools import pairwise
 from math import cos, pi, sin
 
-import cv2
-import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import RendererAgg
-from matplotlib.path import Path as Outline
-from matplotlib.transforms import IdentityTransform
 from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.stats import multivariate_normal, norm
 
@@ -24,11 +19,10 @@ from fingervision.vision.pipeline import measure_frame, steps_alone
 from fingervision.vision.polygon import Side
 from fingervision.vision.profile_lines import INNER_SIDE, OUTER_SIDE, TIP_SIDE
 from fingervision.vision.settings import Settings
+from tests.benchmarks.finger_tips import LENGTH_PX, filled
 
 BELOW_PX = 10.2
 WIDTH_PX = 80.0
-# Rows and columns of the drawn pictures, subdivisions of a pixel, and length of the drawn fingers.
-HEIGHT, BREADTH, FINER, LENGTH_PX = 300, 440, 4, 700.0
 # Blur of the drawn pictures (Gaussian sigma without the pixel's width), and place about which the fingers are turned.
 BLUR_PX, CENTRE = 1.1, np.array([220.0, 105.0])
 
@@ -147,20 +141,9 @@ def test_the_contour_of_a_cut_is_that_of_its_blurred_picture(leg_px: float) -> N
     assert np.abs(chain.residual * u_px).max() < 2e-3
 
 
-def _filled(fingers: list[np.ndarray], rng: np.random.Generator, noise: float = 2.0) -> np.ndarray:
-    """Picture of polygons (pixels) that are filled with exact coverage, blurred before the pixels, with noise."""
-    renderer = RendererAgg(FINER * BREADTH, FINER * HEIGHT, 72.0)
-    context = renderer.new_gc()
-    context.set_linewidth(0.0)
-    context.set_snap(False)
-    with mpl.rc_context({"path.simplify": False, "path.snap": False}):
-        for corners in fingers:
-            x, y = FINER * (np.vstack([corners, corners[:1]]).T + 0.5)
-            codes = [Outline.MOVETO, *[Outline.LINETO] * (x.size - 2), Outline.CLOSEPOLY]
-            path = Outline(np.column_stack([x, FINER * HEIGHT - y]), codes)
-            renderer.draw_path(context, path, IdentityTransform(), (1.0, 1.0, 1.0, 1.0))
-    cover = np.asarray(renderer.buffer_rgba())[..., 3].astype(np.float64) / 255.0
-    light = cv2.GaussianBlur(cover, (0, 0), BLUR_PX * FINER).reshape(HEIGHT, FINER, BREADTH, FINER).mean(axis=(1, 3))
+def _filled(outlines: list[np.ndarray], rng: np.random.Generator, noise: float = 2.0) -> np.ndarray:
+    """Picture of dark polygons (pixels), with noise."""
+    light = filled(outlines, BLUR_PX)
     levels = 200.0 - 160.0 * light + noise * rng.standard_normal(light.shape)
     return np.clip(np.round(levels), 0, 255).astype(np.uint8)
 
