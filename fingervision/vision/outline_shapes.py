@@ -26,7 +26,6 @@ from fingervision.vision.chain import (
     with_small_radii,
 )
 from fingervision.vision.finger_end import FingerEnd
-from fingervision.vision.finger_shape import INNER_R, OUTER_R, SHARP_IN_BLURS
 from fingervision.vision.measuring_point import MeasuringPoint
 from fingervision.vision.outline_points import OutlinePoints
 from fingervision.vision.polygon import Side
@@ -105,7 +104,7 @@ def likely_points(
             for p, own in zip(points, shapes, strict=True)
         ]
     own_fits = [
-        None if known is None or _has_sharp_corner(p, end) else fit_chain(p, _starts(p, end)[0], variance, ())
+        None if known is None else fit_chain(p, _starts(p, end)[0], variance, ())
         for p, end, known in zip(points, ends, fitted, strict=True)
     ]
     is_own = []
@@ -120,12 +119,6 @@ def likely_points(
         for p, own, shares, known, is_same in zip(points, shapes, _probabilities(shapes), fitted, is_own, strict=True)
     ]
     return LikelyPoints(found, sqrt(variance / shared))
-
-
-def _has_sharp_corner(points: OutlinePoints, end: FingerEnd) -> bool:
-    """Whether the fit of fillets leaves the points at a corner out, so that it does not know the corner's radius."""
-    smallest: float = min(end.parameters[[INNER_R, OUTER_R]].tolist())
-    return smallest < SHARP_IN_BLURS * float(points.blur.max())
 
 
 def _starts(points: OutlinePoints, end: FingerEnd) -> list[Start]:
