@@ -60,9 +60,9 @@ static int64_t pieces_of(const double *sides, const Corner *corners, int64_t cou
     return n;
 }
 
-/* Owen's function T(h, t / h): the share of a normal distribution in the plane that lies beyond a line at distance h >= 0, within
-   the angle from the foot of the perpendicular to the point at t along the line (Ann. Math. Stat. 27, 1956, 1075,
-   doi:10.1214/aoms/1177728074). */
+/* Owen's function T(h, t / h): the share of a normal distribution in the plane that lies beyond a line at distance h >= 0,
+   within the angle from the foot of the perpendicular to the point at t along the line (Ann. Math. Stat. 27, 1956, 1075,
+   doi:10.1214/aoms/1177728074); by Gauss and Legendre's rule of ten points. */
 static double owens_t(double h, double t) {
     static const double at[5] = {0.1488743389816312, 0.4333953941292472, 0.6794095682990244, 0.8650633666889845,
                                  0.9739065285171717};
@@ -112,10 +112,11 @@ static int is_beside_corner(const Piece *pieces, int64_t n, double x, double y, 
     return is_near && fabs(outside) < DEEPEST * blur;
 }
 
-/* Exact distance from the half-level contour of a blurred chain. The light is the share of a normal distribution about the point
-   that lies within the chain: the angles under which its pieces are seen, less what lies beyond them, which is a difference of
-   Owen's functions. A displacement of a piece changes the light by the density along it. Where the light rises less steeply than
-   at a straight edge, because normals of several directions are mixed, a straight step does not read the half-level exactly. */
+/* Exact distance from the half-level contour of a blurred chain. The light is the share of a normal distribution about the
+   point that lies within the chain: the angles under which its pieces are seen, less what lies beyond them, which is a
+   difference of Owen's functions. A displacement of a piece changes the light by the density along it. Where the light rises
+   less steeply than at a straight edge, because normals of several directions are mixed, a straight step does not read the
+   half-level exactly. */
 static Away from_light(const Piece *pieces, int64_t n, const double *sides, const Corner *corners, int64_t count, double x,
                        double y, double u, int is_row, double blur, double share, double *by) {
     double angles = PI - (sides[3 * count - 1] - sides[2]), beyond = 0.0, outside = -INFINITY, density;
@@ -231,8 +232,8 @@ static int from_chain(const Arg *in, int is_blurred) {
             found = (Away){share * exact.distance, share * exact.normal_u};
         }
         if (share < 1.0) {
-            Away round = from_fillet(c, &wider[k], sides + 3 * k, x, y, u, FLAGS(6)[i], blur[i], 1.0 - share, by ? by + k : NULL,
-                                     count);
+            Away round = from_fillet(c, &wider[k], sides + 3 * k, x, y, u, FLAGS(6)[i], blur[i], 1.0 - share,
+                                     by ? by + k : NULL, count);
             found.distance += (1.0 - share) * round.distance;
             found.normal_u += (1.0 - share) * round.normal_u;
         }
