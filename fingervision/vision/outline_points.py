@@ -9,6 +9,7 @@ from fingervision.domain.loops import loop
 from fingervision.vision.edge_filters import PIXEL_VARIANCE
 from fingervision.vision.edges import EdgePoints
 from fingervision.vision.fingers import CoarseFinger, CoarseFingers
+from fingervision.vision.mean_profile import SIGMAS_IN_MEDIAN
 from fingervision.vision.median import middle
 from fingervision.vision.profile_lines import INNER_SIDE, IS_ROW, OUTER_SIDE, PLACES, SIDE, TIP_SIDE
 
@@ -20,19 +21,17 @@ SHARED_SLOPE, SHARED_FACTOR = 0.75, 1.25
 # Least contrast of a line as a share of the typical contrast; a line with less contrast crosses the border of the
 # picture instead of a finger's edge.
 LEAST_CONTRAST = 0.3
-# Lines beside a corner: INSIDE the edge (distances in sigma) they are less than SHALLOW away from another side. Their
-# contrast is compared with that of the lines between NEAR and FAR_FROM_END of the end of the side, of which there must
-# be FEWEST; a difference of CERTAINLY standard deviations is as likely a shortfall as chance.
+# Lines beside a corner: INSIDE the edge (distances in sigma) they are less than SHALLOW away from another side. The
+# finger's light on them is compared with that on the lines between NEAR and FAR_FROM_END of the end of the side, of
+# which there must be FEWEST; a difference of CERTAINLY standard deviations is as likely a shortfall as chance.
 INSIDE, SHALLOW, NEAR, FAR_FROM_END, FEWEST, CERTAINLY = 4.0, 3.0, 6.0, 20.0, 4, 5.0
-# Distance from the half-level, in sigma, at which a step is found whose contrast falls short by a share s of the full
-# one: BESIDE s / sqrt(1 - s), within U_BESIDE of itself. It fits rendered fillets, square corners and chamfers at blurs
+# Distance from the half-level, in sigma, at which a step is found if the finger's light falls short by a share s of the
+# full contrast: BESIDE s / sqrt(1 - s), within U_BESIDE of itself. It fits rendered fillets, square corners and chamfers at blurs
 # of 0.8 to 2.2 px, turned by 0 to 18 degrees.
 BESIDE, U_BESIDE, MOST_SHORT = 1.19, 0.15, 0.7
-# Share, and number of standard deviations, by which the lowest contrast of a finger falls short of the usual one
-# where corners are looked for.
+# Share of the contrast, and number of standard deviations, by which a finger's least light falls short of its usual
+# light where corners are looked for.
 LEAST_SHORT, LEAST_IN_SIGMAS = 0.03, 4.0
-# Standard deviation of normally distributed values over their median absolute deviation.
-MAD = 1.4826
 
 _seen_from = loop("outline_points_seen_from")
 
@@ -145,7 +144,7 @@ def _depth(edges: EdgePoints, k: int, kept: NDArray[np.bool_]) -> Floats:
     return depth
 
 
-def _usual(contrast: Floats) -> tuple[float, float]:
-    """Median of the lines' contrasts, and the standard deviation of one of them."""
-    level = middle(contrast)
-    return level, MAD * middle(np.abs(contrast - level))
+def _usual(light: Floats) -> tuple[float, float]:
+    """Median of the light on several lines, and the standard deviation of one of them."""
+    level = middle(light)
+    return level, SIGMAS_IN_MEDIAN * middle(np.abs(light - level))
