@@ -26,8 +26,8 @@ LEAST_CONTRAST = 0.3
 # which there must be FEWEST; a difference of CERTAINLY standard deviations is as likely a shortfall as chance.
 INSIDE, SHALLOW, NEAR, FAR_FROM_END, FEWEST, CERTAINLY = 4.0, 3.0, 6.0, 20.0, 4, 5.0
 # Distance from the half-level, in sigma, at which a step is found if the finger's light falls short by a share s of the
-# full contrast: BESIDE s / sqrt(1 - s), within U_BESIDE of itself. It fits rendered fillets, square corners and chamfers at blurs
-# of 0.8 to 2.2 px, turned by 0 to 18 degrees.
+# full contrast: BESIDE s / sqrt(1 - s), within U_BESIDE of itself. It fits rendered fillets, square corners and
+# chamfers at blurs of 0.8 to 2.2 px, turned by 0 to 18 degrees.
 BESIDE, U_BESIDE, MOST_SHORT = 1.19, 0.15, 0.7
 # Share of the contrast, and number of standard deviations, by which a finger's least light falls short of its usual
 # light where corners are looked for.
